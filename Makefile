@@ -1,0 +1,58 @@
+# graben: `make` or `make help` lists the targets. Chains of stages are in pipelines/*/*.mk.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+READY  := $(VENV)/.ready
+RESULTS ?= results
+FIDELITY ?= standard
+
+include pipelines/upscaling/upscaling.mk
+include pipelines/wear/wear.mk
+
+.PHONY: help
+help: ## list the targets
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sort | awk -F':.*## ' '{printf "  make %-14s %s\n", $$1, $$2}'
+
+.PHONY: install
+install: $(READY) ## make .venv with graben and everything it needs
+
+$(READY): pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "graben needs Python 3.11 or newer; set PYTHON=...")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	@touch $@
+
+.PHONY: demo
+demo: $(READY) ## both chains at draft fidelity, one table, pictures (under 10 minutes)
+	@$(MAKE) --no-print-directory -j2 RESULTS=$(RESULTS)/demo FIDELITY=draft upscaling wear
+	@$(BIN)/python -m pipelines.summary $(RESULTS)/demo
+
+.PHONY: test
+test: $(READY) ## the tests (under 12 minutes, compilation included)
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not verify"
+
+.PHONY: verify
+verify: $(READY) ## the long verification against closed forms
+	$(BIN)/python -m pytest -m verify
+
+.PHONY: bench
+bench: $(READY) ## the benchmarks; JSON lines in results/bench/
+	@mkdir -p $(RESULTS)/bench
+	@for script in benchmarks/*.py; do echo "$$script"; \
+	  $(BIN)/python $$script | tee -a $(RESULTS)/bench/$$(basename $$script .py).jsonl || exit 1; done
+
+.PHONY: lint
+lint: $(READY) ## ruff (lint and format) and mypy
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+.PHONY: clean
+clean: ## remove results, caches and compiled kernels (keeps .venv)
+	rm -rf $(RESULTS) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find graben tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,25 @@
+"""dem-run: run a scene of blocks or of particles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from graben.cli.options import Session, Tool, scene_argument, set_option, stage_options
+
+
+@click.command("dem-run", cls=Tool)
+@scene_argument
+@set_option
+@stage_options
+def main(session: Session, scene: Path, overrides: tuple[str, ...], output: Path, overwrite: bool) -> None:
+    """Run a scene of discrete rock (kind "blocks") or of grains (kind "particles").
+
+    Writes one NetCDF artifact, and VTU files with a PVD beside it for ParaView.
+    """
+    from graben.stages import dem_run
+
+    with session.progress() as progress:
+        headline = dem_run.run(scene, output, overrides=overrides, overwrite=overwrite, progress=progress)
+    session.report(headline)

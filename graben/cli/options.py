@@ -1,0 +1,184 @@
+"""Options, exit codes and progress that all commands share.
+
+A command is ``@click.command("name", cls=Tool)`` with the option decorators below; its body calls one stage
+inside ``with session.progress() as progress`` and hands the headline numbers to ``session.report``.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+FILE = click.Path(path_type=Path)
+
+
+class Tool(click.Command):
+    """A click command whose failures become exit codes 2, 3 and 130, never a traceback without --debug."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except (click.ClickException, click.exceptions.Exit, click.Abort):
+            raise
+        except (Exception, KeyboardInterrupt) as error:
+            if ctx.params.get("debug"):
+                raise
+            from graben.stages.outcome import explain
+
+            outcome = explain(error)
+            name = ctx.info_name or "graben"
+            if outcome is None:
+                click.echo(f"{name}: a fault of the program: {type(error).__name__}: {error}", err=True)
+                click.echo(f"{name}: please report it with the output of --debug", err=True)
+                ctx.exit(1)
+            code, lines = outcome
+            for line in lines:
+                click.echo(f"{name}: {line}", err=True)
+            ctx.exit(code)
+
+
+@dataclass(frozen=True)
+class Session:
+    """What the shared options say about this call."""
+
+    as_json: bool
+    quiet: bool
+    verbose: int
+
+    def report(self, headline: Mapping[str, Any]) -> None:
+        """Print the headline numbers on stdout: one JSON object, or aligned lines for a person."""
+        if self.as_json:
+            click.echo(json.dumps(headline, default=_plain, allow_nan=False))
+        elif not self.quiet:
+            for line in _lines(headline):
+                click.echo(line)
+
+    @contextmanager
+    def progress(self) -> Iterator[Callable[[float, str], None]]:
+        """Yield the callable a stage reports to: a bar on a terminal, otherwise a plain line every 10 s."""
+        if self.quiet:
+            yield lambda fraction, message: None
+        elif sys.stderr.isatty():
+            yield from _bar()
+        else:
+            yield _plain_lines()
+
+
+def _bar() -> Iterator[Callable[[float, str], None]]:
+    from rich.console import Console
+    from rich.progress import Progress, TimeRemainingColumn
+
+    with Progress(*Progress.get_default_columns()[:-1], TimeRemainingColumn(), console=Console(stderr=True)) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda fraction, message: bar.update(task, completed=fraction, description=message)
+
+
+def _plain_lines(every_s: float = 10.0) -> Callable[[float, str], None]:
+    begun = last = time.monotonic()
+
+    def tell(fraction: float, message: str) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last < every_s:
+            return
+        last = now
+        left = f", {(now - begun) * (1 - fraction) / fraction:.0f} s left" if fraction > 0 else ""
+        click.echo(f"{100 * fraction:5.1f} % after {now - begun:.0f} s{left}: {message}", err=True)
+
+    return tell
+
+
+def _plain(value: Any) -> Any:
+    """Numbers of numpy and paths, for JSON."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, Path):
+        return str(value)
+    raise TypeError(f"no JSON for {type(value).__name__}")
+
+
+def _lines(headline: Mapping[str, Any], indent: str = "") -> Iterator[str]:
+    width = max((len(str(k)) for k in headline), default=0)
+    for name, value in headline.items():
+        if isinstance(value, Mapping):
+            yield f"{indent}{name}"
+            yield from _lines(value, indent + "  ")
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
+            yield f"{indent}{name}"
+            for row in value:
+                yield indent + "  " + "  ".join(f"{k} {_short(v)}" for k, v in row.items())
+        else:
+            yield f"{indent}{name:<{width}}  {_short(value)}"
+
+
+def _short(value: Any) -> str:
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _session(ctx: click.Context, as_json: bool, quiet: bool, verbose: int) -> Session:
+    level = logging.ERROR if quiet else (logging.WARNING, logging.INFO, logging.DEBUG)[min(verbose, 2)]
+    logging.basicConfig(level=level, format="%(levelname)s: %(message)s", stream=sys.stderr)
+    logging.getLogger().setLevel(level)
+    for noisy in ("numba", "matplotlib", "h5py", "PIL"):
+        logging.getLogger(noisy).setLevel(logging.WARNING)
+    return Session(as_json, quiet, verbose)
+
+
+def stage_options(function: Callable[..., None]) -> Callable[..., None]:
+    """-o, --overwrite, --json, -v, -q, --debug. The command receives `session`, `output`, `overwrite`."""
+
+    @click.option("-o", "--output", type=FILE, required=True, help="Artifact to write (NetCDF).")
+    @click.option("--overwrite", is_flag=True, help="Replace the output if it exists.")
+    @session_options
+    def wrapped(**kwargs: Any) -> None:
+        function(**kwargs)
+
+    return _renamed(wrapped, function)
+
+
+def session_options(function: Callable[..., None]) -> Callable[..., None]:
+    """--json, -v, -q, --debug. The command receives `session`."""
+
+    @click.option("--json", "as_json", is_flag=True, help="Print the headline numbers as one JSON object.")
+    @click.option("-v", "--verbose", count=True, help="Log more (twice for debugging).")
+    @click.option("-q", "--quiet", is_flag=True, help="No progress, no summary.")
+    @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
+    @click.pass_context
+    def wrapped(ctx: click.Context, /, as_json: bool, verbose: int, quiet: bool, debug: bool, **kwargs: Any) -> None:
+        function(session=_session(ctx, as_json, quiet, verbose), **kwargs)
+
+    return _renamed(wrapped, function)
+
+
+def set_option(function: Callable[..., None]) -> Callable[..., None]:
+    """--set KEY=VALUE, repeatable; the command receives `overrides`, a tuple of strings."""
+    return click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="KEY=VALUE",
+        help='Replace a key of the scene, e.g. --set seed=3 --set loading.confining="1 MPa" (repeatable).',
+    )(function)
+
+
+def scene_argument(function: Callable[..., None]) -> Callable[..., None]:
+    """SCENE.toml; the command receives `scene`, a Path."""
+    return click.argument("scene", type=FILE, metavar="SCENE.toml")(function)
+
+
+def _renamed(wrapped: Any, function: Callable[..., None]) -> Callable[..., None]:
+    wrapped.__name__ = function.__name__
+    wrapped.__doc__ = function.__doc__
+    # click collects options in this attribute, innermost first.
+    wrapped.__click_params__ = getattr(function, "__click_params__", []) + getattr(wrapped, "__click_params__", [])
+    return wrapped

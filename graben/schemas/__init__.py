@@ -1,0 +1,1 @@
+"""What a file must hold: scene models, artifact layouts, units, provenance, checks."""

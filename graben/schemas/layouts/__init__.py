@@ -1,0 +1,1 @@
+"""Artifact layouts, one file per kind."""

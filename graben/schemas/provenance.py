@@ -1,0 +1,70 @@
+"""Where a result came from and what it cost: stored in every artifact."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import resource
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import graben
+from graben.schemas.scene import Scene
+
+
+def sha256_of(path: str | Path) -> str:
+    """SHA-256 of a file's bytes, as hexadecimal digits."""
+    with open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+@dataclass
+class Record:
+    """Provenance and cost of one run. Begin it when a stage starts; `attributes` closes the clocks.
+
+    ``cost`` takes the stage's own figures (steps, elements, energy error, ...), keys with units.
+    """
+
+    scene_text: str = ""
+    seed: int | None = None
+    inputs: dict[str, str] = field(default_factory=dict)
+    cost: dict[str, Any] = field(default_factory=dict)
+    _wall: float = field(default_factory=time.perf_counter)
+    _cpu: float = field(default_factory=time.process_time)
+
+    @classmethod
+    def begin(cls, scene: Scene | None = None, inputs: Iterable[str | Path] = ()) -> Record:
+        """Start the clocks and hash the inputs."""
+        return cls(
+            scene_text=scene.source.effective_text if scene is not None else "",
+            seed=scene.seed if scene is not None else None,
+            inputs={str(p): sha256_of(p) for p in inputs},
+        )
+
+    def closed_cost(self) -> dict[str, Any]:
+        """The cost record with wall time, CPU time and peak memory up to now."""
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return {
+            "wall_s": time.perf_counter() - self._wall,
+            "cpu_s": time.process_time() - self._cpu,
+            "peak_memory_bytes": int(peak) * (1 if sys.platform == "darwin" else 1024),
+            **self.cost,
+        }
+
+    def attributes(self) -> dict[str, Any]:
+        """NetCDF global attributes."""
+        return {
+            "software": "graben",
+            "software_version": graben.__version__,
+            "machine": f"{platform.system()} {platform.machine()} python {platform.python_version()}",
+            "scene": self.scene_text,
+            "scene_sha256": hashlib.sha256(self.scene_text.encode()).hexdigest(),
+            "seed": -1 if self.seed is None else self.seed,
+            "inputs": json.dumps(self.inputs, sort_keys=True),
+            "cost": json.dumps(self.closed_cost(), default=float),
+        }

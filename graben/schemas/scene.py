@@ -1,0 +1,153 @@
+"""Scenes: TOML files, checked against pydantic models; every fault is reported at once."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, PrivateAttr, ValidationError, ValidationInfo
+
+from graben.schemas.faults import BadInput, Fault
+from graben.schemas.quantities import key
+
+Fidelity = Literal["draft", "standard", "reference"]
+
+
+class Model(BaseModel):
+    """A table of a scene: unknown keys are faults, values do not change, defaults are checked too."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True, arbitrary_types_allowed=True)
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a scene came from: its file, its text as run (overrides noted on top), and that text's SHA-256."""
+
+    path: Path
+    text: str
+    overrides: tuple[str, ...] = field(default=())
+
+    @property
+    def effective_text(self) -> str:
+        """The scene's text with the overrides of the command line noted as comments on top."""
+        return "".join(f"# --set {o}\n" for o in self.overrides) + self.text
+
+    @property
+    def sha256(self) -> str:
+        return hashlib.sha256(self.effective_text.encode()).hexdigest()
+
+
+class Scene(Model):
+    """The keys that every scene has. Each kind derives from this and declares ``kind: Literal["..."]``."""
+
+    title: str = key("", "one line that says what this scene is")
+    seed: int = key(0, "seed of everything random: the same scene and seed give bitwise the same arrays", ge=0)
+    fidelity: Fidelity = key("standard", "a measured point between speed and accuracy: draft, standard or reference")
+    _source: Source | None = PrivateAttr(default=None)
+
+    @property
+    def source(self) -> Source:
+        if self._source is None:
+            raise RuntimeError("this scene was not loaded from a file")
+        return self._source
+
+
+def _existing_file(path: Path, info: ValidationInfo) -> Path:
+    folder = (info.context or {}).get("folder", Path())
+    resolved = path if path.is_absolute() else folder / path
+    if (info.context or {}).get("check_files", True) and not resolved.is_file():
+        raise ValueError(f"an existing file (looked for {resolved})")
+    return resolved
+
+
+InputFile = Annotated[Path, AfterValidator(_existing_file)]
+"""A path in a scene, relative to the scene's own folder; it must exist when the scene is loaded."""
+
+
+def load_scene(path: str | Path, kind: str | Iterable[str], overrides: Iterable[str] = ()) -> Any:
+    """Read and check a scene file.
+
+    Parameters
+    ----------
+    path : the TOML file
+    kind : the kind, or kinds, of scene that the caller takes
+    overrides : ``"table.key=value"`` settings that replace keys of the file
+
+    Returns
+    -------
+    the scene model of that kind, with ``.source``
+
+    Raises
+    ------
+    BadInput : every fault of the file at once
+    """
+    from graben.schemas.kinds import SCENES, scene_model
+
+    path = Path(path)
+    kinds = [kind] if isinstance(kind, str) else list(kind)
+    text, tables = _parse(path)
+    overrides = tuple(overrides)
+    for setting in overrides:
+        _override(tables, setting)
+    found = tables.get("kind")
+    if not isinstance(found, str) or found not in SCENES or found not in kinds:
+        shown = "(absent)" if found is None else repr(found)
+        raise BadInput(Fault(str(path), "kind", shown, " or ".join(map(repr, kinds))))
+    model = scene_model(found)
+    try:
+        scene = model.model_validate(tables, context={"folder": path.resolve().parent})
+    except ValidationError as error:
+        raise BadInput(_faults(str(path), error)) from None
+    scene._source = Source(path, text, overrides)
+    return scene
+
+
+def _parse(path: Path) -> tuple[str, dict[str, Any]]:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise BadInput(Fault(str(path), "", "", "an existing scene file")) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadInput(Fault(str(path), "", "", f"a readable TOML file in UTF-8 ({error})")) from None
+    try:
+        return text, tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(Fault(str(path), "", "", f"valid TOML ({error})")) from None
+
+
+def _override(tables: dict[str, Any], setting: str) -> None:
+    name, equals, raw = setting.partition("=")
+    parts = name.strip().split(".")
+    if not equals or not all(parts):
+        raise BadInput(Fault("--set", setting, "", "KEY=VALUE with a dotted key, such as seed=3"))
+    try:
+        value = tomllib.loads(f"v = {raw}")["v"]
+    except tomllib.TOMLDecodeError:
+        value = raw.strip()  # an unquoted string, as shells like to leave it
+    table = tables
+    for part in parts[:-1]:
+        table = table.setdefault(part, {})
+        if not isinstance(table, dict):
+            raise BadInput(Fault("--set", name, repr(raw), f"a table at {part}"))
+    table[parts[-1]] = copy.deepcopy(value)
+
+
+def _faults(file: str, error: ValidationError) -> list[Fault]:
+    faults = []
+    for e in error.errors(include_url=False):
+        where = ".".join(str(part) for part in e["loc"])
+        value = e.get("input")
+        if e["type"] == "missing":
+            found, expected = "(absent)", "a value"
+        elif e["type"] == "extra_forbidden":
+            found, expected = repr(value), "no such key (see `graben scene KIND` for those that exist)"
+        else:
+            found = repr(value) if not isinstance(value, dict | BaseModel) else ""
+            expected = e["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+        faults.append(Fault(file, where, found if len(found) < 200 else found[:200] + "...", expected))
+    return faults

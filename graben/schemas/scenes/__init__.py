@@ -1,0 +1,1 @@
+"""Scene models, one file per kind."""

@@ -1,0 +1,1 @@
+"""One module per command: open inputs, check them, call mechanics, write one artifact."""

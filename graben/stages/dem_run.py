@@ -1,0 +1,33 @@
+"""dem-run: hand a scene to the stage of its kind, blocks or particles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from graben.schemas.files import refuse_existing
+from graben.schemas.scene import load_scene
+from graben.stages.record import Progress, silent
+
+
+def run(
+    scene_path: Path,
+    output: Path,
+    *,
+    overrides: Iterable[str] = (),
+    overwrite: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Run the scene and write its artifact; returns the headline numbers of the stage of its kind.
+
+    Raises
+    ------
+    BadInput : the scene has faults, or the output exists
+    NumericsFailed : the run had to stop; the last good state is kept beside the output
+    """
+    scene = load_scene(scene_path, ("blocks", "particles"), overrides)
+    refuse_existing(output, overwrite)
+    stage = import_module(f"graben.stages.{scene.kind}")
+    return stage.run(scene, output, progress=progress)

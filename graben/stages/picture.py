@@ -1,0 +1,36 @@
+"""graben show: one picture of one artifact, by the drawer of its kind."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+
+from graben.schemas.artifact import read_artifact
+from graben.schemas.faults import BadInput, Fault
+from graben.schemas.files import refuse_existing, whole_file
+from graben.schemas.kinds import LAYOUTS
+
+FORMATS = (".png", ".pdf", ".svg")
+
+
+def run(artifact: Path, output: Path, *, overwrite: bool = False) -> None:
+    """Draw `artifact` into `output`.
+
+    Raises
+    ------
+    BadInput : the artifact has faults, the picture exists, or its format is not one of FORMATS
+    """
+    if output.suffix not in FORMATS:
+        raise BadInput(Fault(str(output), "", "", "a picture name ending in " + ", ".join(FORMATS)))
+    refuse_existing(output, overwrite)
+    dataset = read_artifact(artifact, LAYOUTS)
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib.figure import Figure
+
+    drawer = import_module("graben.stages.show." + dataset.attrs["schema_kind"].replace("-", "_"))
+    figure = Figure(figsize=(10, 7), layout="constrained")
+    drawer.draw(dataset, figure)
+    with whole_file(output) as temporary:
+        figure.savefig(temporary, dpi=130)

@@ -1,0 +1,1 @@
+"""Pictures of artifacts, one file per kind: `draw(dataset, figure)`."""
