@@ -1,0 +1,424 @@
+"""Extended Drucker-Prager plasticity with ductile damage, Y 2.5.2.
+
+With p = -tr(s)/3, q the von Mises stress and r^3 = 27/2 det(dev s) of the effective stress s = sigma / (1 - D)
+(Y prints p and q swapped):
+
+    F = t - p tan(beta) - (1 - tan(beta)/3) sigma_c(e)        Y (2.29)
+    t = q/2 (1 + 1/K - (1 - 1/K) (r/q)^3)
+    G = t - p tan(psi)                                        Y (2.30)
+
+beta is the friction angle in the p-t plane and e the equivalent plastic strain, which equals the axial plastic strain
+in uniaxial compression: de = (1 - tan(psi)/3) dlambda. sigma_c(e) is a curve of `hardening.py`.
+
+Damage starts when the sum of de / e_f(eta) reaches 1, with triaxiality eta = -p/q and e_f = D2 exp(D3 eta), Y (2.33)
+and (2.71)-(2.72); from there dD = L de / u_f, Y (2.34), with the element length L. D stops at max_damage.
+
+Return mapping: the law is isotropic, so only principal values change. In the deviatoric plane, with polar
+coordinates rho = sqrt(2/3) q and Lode angle th (cos 3 th = (r/q)^3), t = sqrt(3/2) rho h(th) with
+h = 1 + k/2 (1 + cos 3 th), k = 1/K - 1, and backward Euler reads
+
+    rho = rho_tr cos(th - th_tr) - a h,   0 = rho_tr sin(th - th_tr) + a h',   a = sqrt(6) mu dlambda.
+
+Two unknowns (dlambda, th); Newton first, nested bisection where that fails, which cannot for a convex surface
+(K >= 7/9). Where rho would become negative the stress returns to the apex; beyond the flow along G, the apex takes volumetric
+flow v whose equivalent plastic strain is (1 - tan(psi)/3) v / tan(beta), so that the two agree when psi = beta.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from graben.mechanics.compiled import kernel
+from graben.mechanics.materials.elastic import POISSON, YOUNG, add_elastic, fill_elastic, finite, moduli
+from graben.mechanics.materials.hardening import BARCELONA, CHOICES, EXPONENTIAL, barcelona_coefficients, harden
+from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law, Parameter
+from graben.mechanics.materials.principal import (
+    back_plane_stress,
+    back_plane_tangent,
+    back_space_stress,
+    back_space_tangent,
+    shear_modulus,
+    split_plane,
+    split_space,
+)
+
+# slots of par, in the order of PARAMETERS below; then the derived values; then the table
+_E, _NU, _BETA, _PSI, _K, _KIND, _SIGMA0, _GAIN, _RATE, _PEAK, _EPEAK, _SLOPE, _DAMAGE, _E50, _E60, _UF, _DMAX = (
+    range(17)
+)
+_TAN_BETA, _TAN_PSI, _HARD_A, _HARD_B, _LOG_D2, _D3, _TABLE = range(17, 24)
+
+_ROOT23 = math.sqrt(2.0 / 3.0)
+_ROOT32 = math.sqrt(1.5)
+_THIRD_TURN = 2.0 * math.pi / 3.0
+_SIXTH_TURN = math.pi / 3.0
+_TAN_LIMIT = math.degrees(math.atan(3.0))  # beta where 1 - tan(beta)/3 vanishes
+
+
+@kernel(error_model="numpy")
+def prepare_drucker_prager(par):
+    """Fill the derived slots of par: tangents of the angles, hardening coefficients, damage coefficients."""
+    par[_TAN_BETA] = math.tan(par[_BETA])
+    par[_TAN_PSI] = math.tan(par[_PSI])
+    kind = int(par[_KIND])
+    par[_HARD_A], par[_HARD_B] = 0.0, 0.0
+    if kind == EXPONENTIAL:
+        par[_HARD_A], par[_HARD_B] = par[_GAIN], par[_RATE]
+    elif kind == BARCELONA:
+        par[_HARD_A], par[_HARD_B] = barcelona_coefficients(par[_SIGMA0], par[_PEAK], par[_EPEAK])
+    else:
+        par[_HARD_A] = par[_SLOPE]
+    par[_LOG_D2], par[_D3] = 0.0, 0.0
+    if par[_DAMAGE] != 0.0:
+        log50, log60 = math.log(par[_E50]), math.log(par[_E60])
+        par[_LOG_D2] = 6.0 * log50 - 5.0 * log60
+        par[_D3] = 10.0 * (log50 - log60)
+
+
+@kernel(error_model="numpy")
+def _yield_stress(strain, par):
+    """(1 - tan(beta)/3) sigma_c and its slope."""
+    value, slope = harden(int(par[_KIND]), strain, par[_SIGMA0], par[_HARD_A], par[_HARD_B], par, _TABLE)
+    factor = 1.0 - par[_TAN_BETA] / 3.0
+    return factor * value, factor * slope
+
+
+@kernel(error_model="numpy")
+def _shape(theta, k):
+    """h(theta) and its first and second derivative."""
+    cos3 = math.cos(3.0 * theta)
+    return 1.0 + 0.5 * k * (1.0 + cos3), -1.5 * k * math.sin(3.0 * theta), -4.5 * k * cos3
+
+
+@kernel(error_model="numpy")
+def _newton(p, rho, theta, strain, bulk, flow, k, par):
+    """Smooth part of the surface by Newton: (found, dlambda, theta). flow = sqrt(6) mu."""
+    tan_b, tan_p = par[_TAN_BETA], par[_TAN_PSI]
+    rate = 1.0 - tan_p / 3.0
+    d, slope = _yield_stress(strain, par)
+    size = _ROOT32 * rho + abs(p) * tan_b + d
+    delta, multiplier = 0.0, 0.0
+    for _iteration in range(14):
+        h, h1, h2 = _shape(theta + delta, k)
+        sine, cosine = math.sin(delta), math.cos(delta)
+        a = flow * multiplier
+        radius = rho * cosine - a * h
+        turn = rho * sine + a * h1
+        excess = _ROOT32 * radius * h - tan_b * (p + bulk * tan_p * multiplier) - d
+        if multiplier > 0.0 and abs(turn) <= 1e-13 * rho and abs(excess) <= 1e-13 * size:
+            good = radius >= 0.0 and theta + delta <= _SIXTH_TURN + 1e-9 and delta >= -1e-9
+            return good, multiplier, theta + delta
+        tt = rho * cosine + a * h2
+        tm = flow * h1
+        et = _ROOT32 * (radius * h1 - turn * h)
+        em = -_ROOT32 * flow * h * h - tan_b * tan_p * bulk - slope * rate
+        det = tt * em - tm * et
+        if det == 0.0:
+            break
+        delta -= (turn * em - tm * excess) / det
+        multiplier -= (tt * excess - et * turn) / det
+        if not (0.0 <= multiplier < 1e30 and abs(delta) < 1.1):
+            break
+        d, slope = _yield_stress(strain + rate * multiplier, par)
+    return False, 0.0, theta
+
+
+@kernel(error_model="numpy")
+def _turned(rho, theta, a, k):
+    """Lode angle after the return with a given a, by safeguarded Newton in [theta, pi/3]."""
+    low, high = theta, _SIXTH_TURN
+    angle = theta
+    for _iteration in range(100):
+        h, h1, h2 = _shape(angle, k)
+        turn = rho * math.sin(angle - theta) + a * h1
+        if turn > 0.0:
+            high = angle
+        else:
+            low = angle
+        if turn == 0.0 or high - low < 1e-16:
+            break
+        tt = rho * math.cos(angle - theta) + a * h2
+        angle = angle - turn / tt if tt > 0.0 else -1.0
+        if not low < angle < high:
+            angle = 0.5 * (low + high)
+    return angle
+
+
+@kernel(error_model="numpy")
+def _bisect(p, rho, theta, strain, bulk, flow, k, par):
+    """Return by nested bisection: (state, dlambda, theta), state 0 smooth, 1 apex, 2 failed."""
+    tan_b, tan_p = par[_TAN_BETA], par[_TAN_PSI]
+    rate = 1.0 - tan_p / 3.0
+    low, high = 0.0, rho / flow  # h >= 1, so the deviator is gone at a = rho at the latest
+    angle = theta
+    smooth = False
+    for _iteration in range(200):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        angle = _turned(rho, theta, flow * middle, k)
+        h, _h1, _h2 = _shape(angle, k)
+        radius = rho * math.cos(angle - theta) - flow * middle * h
+        d, _slope = _yield_stress(strain + rate * middle, par)
+        excess = _ROOT32 * radius * h - tan_b * (p + bulk * tan_p * middle) - d
+        if radius > 0.0 and excess > 0.0:
+            low = middle
+        else:
+            high = middle
+            smooth = radius > 0.0
+        if high - low <= 1e-15 * high:
+            break
+    if smooth:
+        return 0, high, _turned(rho, theta, flow * high, k)
+    return 1, high, angle
+
+
+@kernel(error_model="numpy")
+def _apex_flow(p, strain, bulk, par):
+    """Volumetric plastic strain v >= 0 that brings a purely volumetric stress at pressure p to the apex."""
+    tan_b = par[_TAN_BETA]
+    if tan_b <= 0.0:
+        return 0.0
+    rate = (1.0 - par[_TAN_PSI] / 3.0) / tan_b
+    low, high = 0.0, max(0.0, -p / bulk)
+    flow = 0.0
+    for _iteration in range(120):
+        d, slope = _yield_stress(strain + rate * flow, par)
+        excess = -tan_b * (p + bulk * flow) - d
+        if excess > 0.0:
+            low = flow
+        else:
+            high = flow
+        if high - low <= 1e-16 * high or abs(excess) <= 1e-15 * d:
+            break
+        step = tan_b * bulk + slope * rate
+        flow = flow + excess / step if step > 0.0 else -1.0
+        if not low < flow < high:
+            flow = 0.5 * (low + high)
+    return flow
+
+
+@kernel(error_model="numpy")
+def _damage(state, gain, eta, length, par):
+    """Advance state[1] damage and state[2] initiation by an equivalent plastic strain `gain` at triaxiality eta.
+
+    Returns d(damage)/d(gain) and d(damage)/d(eta).
+    """
+    eta = min(max(eta, -10.0), 10.0)
+    exponent = min(max(par[_LOG_D2] + par[_D3] * eta, -60.0), 60.0)
+    strain_f = math.exp(exponent)
+    before = state[2]
+    state[2] = before + gain / strain_f
+    if state[2] <= 1.0 or state[1] >= par[_DMAX]:
+        return 0.0, 0.0
+    left = max(0.0, 1.0 - before) * strain_f  # the part of gain spent before initiation
+    speed = length / par[_UF]
+    damage = state[1] + speed * (gain - left)
+    if damage >= par[_DMAX]:
+        state[1] = par[_DMAX]
+        return 0.0, 0.0
+    state[1] = damage
+    bounded = abs(eta) < 10.0 and abs(exponent) < 60.0
+    return speed, -speed * left * par[_D3] if bounded else 0.0
+
+
+@kernel(error_model="numpy")
+def _return(s1, s2, s3, bulk, shear, state, par, length, tangent):
+    """Effective trial principal values (sorted) -> code, s1, s2, s3 nominal, with tangent[:3, :3] and state set.
+
+    Called only where the trial stress lies outside the yield surface.
+    """
+    tan_b, tan_p = par[_TAN_BETA], par[_TAN_PSI]
+    rate = 1.0 - tan_p / 3.0
+    k = 1.0 / par[_K] - 1.0
+    flow = math.sqrt(6.0) * shear
+    p_trial = -(s1 + s2 + s3) / 3.0
+    x = _ROOT32 * (s1 + p_trial)
+    y = (s2 - s3) * math.sqrt(0.5)
+    rho_trial = math.hypot(x, y)
+    theta_trial = math.atan2(y, x)
+    if theta_trial > _SIXTH_TURN:
+        theta_trial = _SIXTH_TURN
+    strain = state[0]
+    found, multiplier, theta = _newton(p_trial, rho_trial, theta_trial, strain, bulk, flow, k, par)
+    apex = False
+    if not found:
+        which, multiplier, theta = _bisect(p_trial, rho_trial, theta_trial, strain, bulk, flow, k, par)
+        apex = which == 1
+    h, h1, h2 = _shape(theta, k)
+    p = p_trial + bulk * tan_p * multiplier
+    a = flow * multiplier
+    rho = 0.0
+    extra = 0.0
+    if apex:
+        extra = _apex_flow(p, strain + rate * multiplier, bulk, par)
+        p += bulk * extra
+    else:
+        rho = rho_trial * math.cos(theta - theta_trial) - a * h
+    gain = rate * multiplier
+    if extra > 0.0:
+        gain += rate * extra / tan_b
+    r1, r2, r3 = math.cos(theta), math.cos(theta - _THIRD_TURN), math.cos(theta + _THIRD_TURN)
+    radius = _ROOT23 * rho
+    e1, e2, e3 = radius * r1 - p, radius * r2 - p, radius * r3 - p
+    if not (abs(e1) + abs(e2) + abs(e3) + gain < 1e150):
+        return NOT_CONVERGED, s1, s2, s3
+    state[0] = strain + gain
+    per_gain, per_eta = 0.0, 0.0
+    q = _ROOT32 * rho
+    eta = -p / q if q > 1e-12 * abs(p) else (10.0 if p < 0.0 else -10.0)
+    if par[_DAMAGE] != 0.0:
+        per_gain, per_eta = _damage(state, gain, eta, length, par)
+    keep = 1.0 - state[1]
+    if tangent.shape[0] > 0:
+        _d, slope = _yield_stress(state[0], par)
+        r1, r2, r3 = _ROOT23 * r1, _ROOT23 * r2, _ROOT23 * r3
+        t1 = -_ROOT23 * math.sin(theta)
+        t2 = -_ROOT23 * math.sin(theta - _THIRD_TURN)
+        t3 = -_ROOT23 * math.sin(theta + _THIRD_TURN)
+        radial = (r1, r2, r3)
+        around = (t1, t2, t3)
+        stress = (e1, e2, e3)
+        if apex:
+            soft = tan_b * bulk + (slope * rate / tan_b if tan_b > 0.0 else 0.0)
+            for j in range(3):
+                lam = 2.0 * shear * radial[j] / (flow * h)
+                v = 0.0
+                if extra > 0.0 and soft != 0.0:
+                    v = (tan_b * bulk - (tan_b * bulk * tan_p + slope * rate) * lam) / soft
+                dp = -bulk + bulk * tan_p * lam + bulk * v
+                dgain = rate * lam + (rate * v / tan_b if tan_b > 0.0 else 0.0)
+                for i in range(3):
+                    tangent[i, j] = -keep * dp - per_gain * dgain * stress[i]
+        else:
+            m = 1.0 / (1.0 + a * (h + h2) / rho) if rho > 0.0 else 0.0
+            turn = m * h1
+            stiff = _ROOT32 * flow * (h * h + h1 * turn) + tan_b * tan_p * bulk + slope * rate
+            for j in range(3):
+                lam = 0.0
+                if stiff != 0.0:
+                    lam = (_ROOT32 * 2.0 * shear * (h * radial[j] + turn * around[j]) + tan_b * bulk) / stiff
+                dp = -bulk + bulk * tan_p * lam
+                dd = per_gain * rate * lam
+                if per_eta != 0.0:
+                    drho = 2.0 * shear * radial[j] - flow * h * lam
+                    dd += per_eta * (-dp + p / rho * drho) / q
+                for i in range(3):
+                    ds = 2.0 * shear * (radial[i] * radial[j] + m * around[i] * around[j])
+                    ds -= flow * lam * (h * radial[i] + turn * around[i])
+                    tangent[i, j] = keep * (ds - dp) - dd * stress[i]
+    return OK, keep * e1, keep * e2, keep * e3
+
+
+@kernel(error_model="numpy")
+def update_drucker_prager(deps, sig, state, par, length, tangent):
+    """The law `drucker-prager`; arguments and return code as in `laws.update`."""
+    if not (finite(deps) and finite(sig)):
+        return NOT_FINITE
+    bulk, shear = moduli(par[_E], par[_NU])
+    keep = 1.0 - state[1]
+    n = sig.shape[0]
+    old0, old1, old2, old3 = sig[0], sig[1], sig[2], sig[3]
+    old4, old5 = (sig[4], sig[5]) if n == 6 else (0.0, 0.0)
+    add_elastic(deps, keep, bulk, shear, sig)
+    # effective trial stress; the yield function needs only invariants
+    x0, x1, x2, x3 = sig[0] / keep, sig[1] / keep, sig[2] / keep, sig[3] / keep
+    x4, x5 = (sig[4] / keep, sig[5] / keep) if n == 6 else (0.0, 0.0)
+    p = -(x0 + x1 + x2) / 3.0
+    d0, d1, d2 = x0 + p, x1 + p, x2 + p
+    q2 = 1.5 * (d0 * d0 + d1 * d1 + d2 * d2 + 2.0 * (x3 * x3 + x4 * x4 + x5 * x5))
+    q = math.sqrt(q2)
+    k = 1.0 / par[_K] - 1.0
+    cos3 = 0.0
+    if k != 0.0 and q > 0.0:
+        det = d0 * (d1 * d2 - x4 * x4) - x3 * (x3 * d2 - x4 * x5) + x5 * (x3 * x4 - d1 * x5)
+        cos3 = 13.5 * det / (q2 * q)
+    t = q * (1.0 + 0.5 * k * (1.0 + cos3))
+    d, _slope = _yield_stress(state[0], par)
+    friction = p * par[_TAN_BETA]
+    if t - friction - d <= 1e-13 * (t + abs(friction) + d):
+        fill_elastic(keep, bulk, shear, tangent)
+        return OK
+    if n == 4:
+        s1, s2, s3, c, s, rank = split_plane(x0, x1, x2, x3)
+        code, e1, e2, e3 = _return(s1, s2, s3, bulk, shear, state, par, length, tangent)
+        if code != OK:
+            sig[0], sig[1], sig[2], sig[3] = old0, old1, old2, old3
+            return code
+        back_plane_stress(e1, e2, e3, c, s, rank, sig)
+        if tangent.shape[0] > 0:
+            g12, g13, g23 = _shears(e1, e2, e3, s1, s2, s3, q, 1.0 - state[1], shear, tangent)
+            back_plane_tangent(c, s, rank, g12, g13, g23, tangent)
+        return OK
+    vectors = np.empty((3, 3))
+    whole = np.empty(6)
+    whole[0], whole[1], whole[2], whole[3], whole[4], whole[5] = x0, x1, x2, x3, x4, x5
+    s1, s2, s3 = split_space(whole, vectors)
+    code, e1, e2, e3 = _return(s1, s2, s3, bulk, shear, state, par, length, tangent)
+    if code != OK:
+        sig[0], sig[1], sig[2], sig[3], sig[4], sig[5] = old0, old1, old2, old3, old4, old5
+        return code
+    back_space_stress(e1, e2, e3, vectors, sig)
+    if tangent.shape[0] > 0:
+        g12, g13, g23 = _shears(e1, e2, e3, s1, s2, s3, q, 1.0 - state[1], shear, tangent)
+        back_space_tangent(vectors, g12, g13, g23, tangent)
+    return OK
+
+
+@kernel(error_model="numpy")
+def _shears(e1, e2, e3, s1, s2, s3, scale, keep, shear, tangent):
+    """The three tangent shear moduli between principal axes; e nominal values, s effective trial values."""
+    g12 = shear_modulus(e1, e2, s1, s2, tangent[0, 0], tangent[0, 1], scale, shear)
+    g13 = shear_modulus(e1, e3, s1, s3, tangent[0, 0], tangent[0, 2], scale, shear)
+    g23 = shear_modulus(e2, e3, s2, s3, tangent[1, 1], tangent[1, 2], scale, shear)
+    return g12, g13, g23
+
+
+def _check(values: Mapping[str, Any]) -> list[str]:
+    found = []
+    if values.get("hardening", "exponential") == "barcelona" and values["peak_yield"] < values["initial_yield"]:
+        found.append("peak_yield at least initial_yield")
+    if values.get("hardening") == "table" and np.any(np.asarray(values["hardening_table"])[:, 1] < 0.0):
+        found.append("hardening_table without negative stresses")
+    return found
+
+
+PARAMETERS = (
+    YOUNG,
+    Parameter("poisson_ratio", "1", -0.99, POISSON.upper, None, POISSON.description, POISSON.usual),
+    Parameter(
+        "friction_angle", "rad", 0.0, math.radians(71.0), None,
+        "slope of the yield surface in the p-t plane (not Mohr-Coulomb's angle)", "45 to 60 deg for jointed rock",
+    ),
+    Parameter("dilation_angle", "rad", 0.0, math.radians(71.0), 0.0, "slope of the flow potential in the p-t plane", "5 to 40 deg"),
+    Parameter("flow_stress_ratio", "1", 7.0 / 9.0, 1.0, 1.0, "K, strength in triaxial extension over compression; convex from 7/9", "0.78 to 1"),
+    Parameter("hardening", "1", default="exponential", choices=CHOICES, description="form of the hardening curve"),
+    Parameter("initial_yield", "Pa", 0.0, 1e16, 0.0, "uniaxial compressive yield stress at no plastic strain", "1 kPa to 10 MPa"),
+    Parameter("hardening_gain", "Pa", 0.0, 1e16, None, "Q: how far the yield stress rises in all", "0.5 to 10 MPa", when=("hardening", "exponential")),
+    Parameter("hardening_rate", "1", 0.0, 1e9, None, "b: rate of the rise per plastic strain", "10 to 1000", when=("hardening", "exponential")),
+    Parameter("peak_yield", "Pa", 0.0, 1e16, None, "yield stress at the peak of the Barcelona curve", "0.5 to 5 MPa", when=("hardening", "barcelona")),
+    Parameter("strain_at_peak", "1", 1e-9, 1e3, None, "plastic strain at that peak", "0.5 to 5 %", when=("hardening", "barcelona")),
+    Parameter("hardening_modulus", "Pa", -1e16, 1e16, 0.0, "slope of the linear hardening curve", when=("hardening", "linear")),
+    Parameter("damage", "1", default="none", choices=("none", "ductile"), description="ductile damage off or on"),
+    Parameter("initiation_strain_050", "1", 1e-12, 1e6, None, "plastic strain at damage initiation, triaxiality -0.5", "0.01 to 5 %", when=("damage", "ductile")),
+    Parameter("initiation_strain_060", "1", 1e-12, 1e6, None, "plastic strain at damage initiation, triaxiality -0.6", "0.1 to 20 %", when=("damage", "ductile")),
+    Parameter("failure_displacement", "m", 1e-12, 1e9, None, "plastic displacement from initiation to D = 1", "0.01 to 5 m", when=("damage", "ductile")),
+    Parameter("max_damage", "1", 0.0, 0.999999, 0.99, "damage stops here, so that a stiffness remains", when=("damage", "ductile")),
+    Parameter("hardening_table", "1, Pa", default=None, table=True, description="rows (plastic strain, yield stress)", when=("hardening", "table")),
+)  # fmt: skip
+
+DRUCKER_PRAGER = Law(
+    id=3,
+    name="drucker-prager",
+    title="extended Drucker-Prager with ductile damage",
+    parameters=PARAMETERS,
+    derived=("tan_friction", "tan_dilation", "hardening_a", "hardening_b", "log_d2", "d3"),
+    state_names=("equivalent_plastic_strain", "damage", "initiation"),
+    initial_state=lambda par: np.zeros(3),
+    prepare=prepare_drucker_prager,
+    check=_check,
+)

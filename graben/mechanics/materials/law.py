@@ -1,0 +1,162 @@
+"""What a constitutive law declares about itself: parameters, bounds, units, state; and how values become `par`.
+
+A law is one compiled function (see `laws.py`) plus one `Law` record. `Law.pack` turns named values in SI units
+into the flat float64 array that the compiled function reads:
+
+    par = [one slot per Parameter that is not a table, in declared order]
+        + [one slot per derived value, filled by `Law.prepare`]
+        + [each table in declared order: count n, then x0, y0, x1, y1, ...]
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+OK = 0
+NOT_CONVERGED = 1  # the return mapping found no root
+NOT_FINITE = 2  # nan or inf came in, or a tensor too large to square
+UNKNOWN_LAW = 9
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a law.
+
+    unit is SI ("Pa", "rad", "m", "1"); lower and upper are inclusive bounds of what the law can compute, not of
+    what is usual (`usual` says that). default None means required. `choices` makes it a word, stored as its index.
+    `when = (other, word)` says that it counts only if the choice parameter `other` is `word`.
+    `table` makes it an (n, 2) array with rising first column.
+    """
+
+    name: str
+    unit: str
+    lower: float = -math.inf
+    upper: float = math.inf
+    default: Any = None
+    description: str = ""
+    usual: str = ""
+    choices: tuple[str, ...] = ()
+    when: tuple[str, str] | None = None
+    table: bool = False
+
+
+def _nothing(par: NDArray[np.float64]) -> None:
+    """A law without derived values."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law's record: `id` is what the compiled dispatch branches on.
+
+    initial_state(par) gives the (m,) state array of the unstressed material; state[0] is the equivalent plastic
+    strain and state[1] the damage where a law has them. prepare(par) fills the derived slots in place.
+    check(values) returns texts for faults that concern several parameters at once.
+    """
+
+    id: int
+    name: str
+    parameters: tuple[Parameter, ...]
+    state_names: tuple[str, ...]
+    initial_state: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+    title: str = ""
+    derived: tuple[str, ...] = ()
+    prepare: Callable[[NDArray[np.float64]], Any] = _nothing
+    check: Callable[[Mapping[str, Any]], list[str]] = field(default=lambda values: [])
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of that name; KeyError when there is none."""
+        for p in self.parameters:
+            if p.name == name:
+                return p
+        raise KeyError(name)
+
+    def index(self, name: str) -> int:
+        """Slot of a number or choice parameter in `par`."""
+        return [p.name for p in self.parameters if not p.table].index(name)
+
+    def active(self, values: Mapping[str, Any]) -> tuple[Parameter, ...]:
+        """Parameters that count, given the choices in `values`."""
+
+        def counts(p: Parameter) -> bool:
+            if p.when is None:
+                return True
+            other = self.parameter(p.when[0])
+            return values.get(other.name, other.default) == p.when[1]
+
+        return tuple(p for p in self.parameters if counts(p))
+
+    def faults(self, values: Mapping[str, Any]) -> list[tuple[str, str]]:
+        """Every fault of `values` as (parameter name, what was expected); empty when they can be packed."""
+        found: list[tuple[str, str]] = []
+        names = {p.name for p in self.parameters}
+        for name in values:
+            if name not in names:
+                found.append((name, f"one of the parameters of {self.name}: {', '.join(sorted(names))}"))
+        active = self.active(values)
+        for p in self.parameters:
+            value = values.get(p.name, p.default)
+            if p not in active:
+                if p.name in values and p.when is not None:
+                    found.append((p.name, f"no value: it counts only with {p.when[0]} = {p.when[1]!r}"))
+                continue
+            if value is None:
+                found.append((p.name, f"a value in {p.unit}: required by {self.name}"))
+            elif p.choices:
+                if value not in p.choices:
+                    found.append((p.name, f"one of {', '.join(p.choices)}"))
+            elif p.table:
+                found += [(p.name, text) for text in _table_faults(value)]
+            else:
+                try:
+                    number = float(value)
+                except (TypeError, ValueError):
+                    found.append((p.name, f"a number in {p.unit}"))
+                    continue
+                if not math.isfinite(number) or not p.lower <= number <= p.upper:
+                    found.append((p.name, f"a number from {p.lower:g} to {p.upper:g} {p.unit}"))
+        if not found:
+            found += [("", text) for text in self.check(values)]
+        return found
+
+    def pack(self, values: Mapping[str, Any]) -> NDArray[np.float64]:
+        """Named values in SI -> par (k,). ValueError that lists every fault."""
+        faults = self.faults(values)
+        if faults:
+            raise ValueError(f"{self.name}: " + "; ".join(f"{name}: expected {text}" for name, text in faults))
+        numbers: list[float] = []
+        tables: list[float] = []
+        active = self.active(values)
+        for p in self.parameters:
+            value = values.get(p.name, p.default)
+            if p.table:
+                rows = np.empty((0, 2)) if p not in active else np.asarray(value, dtype=np.float64)
+                tables += [float(len(rows)), *rows.ravel().tolist()]
+            elif p.choices:
+                numbers.append(float(p.choices.index(value)))
+            elif p in active:
+                numbers.append(float(value))
+            else:
+                numbers.append(0.0)
+        par = np.array(numbers + [0.0] * len(self.derived) + tables, dtype=np.float64)
+        self.prepare(par)
+        return par
+
+
+def _table_faults(value: Any) -> list[str]:
+    try:
+        rows = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return ["an (n, 2) table of numbers"]
+    if rows.ndim != 2 or rows.shape[1:] != (2,) or len(rows) < 1:
+        return [f"an (n, 2) table with at least one row, found shape {rows.shape}"]
+    if not np.isfinite(rows).all():
+        return ["finite numbers in the table"]
+    if np.any(np.diff(rows[:, 0]) <= 0.0):
+        return ["a first column that rises"]
+    return []

@@ -1,0 +1,70 @@
+"""The registry of constitutive laws and the one compiled entry point that drivers and elements call.
+
+    par = pack("drucker-prager", {"young_modulus": 1.8e9, ...})
+    state = LAWS["drucker-prager"].initial_state(par)
+    code = update(LAWS["drucker-prager"].id, deps, sig, state, par, length, tangent)
+
+Contract of `update` and of every law's own `update_<name>(deps, sig, state, par, length, tangent)`:
+
+- deps (n,) strain increment with engineering shears; n is 4 (plane strain, axisymmetric: xx, yy, zz, xy) or 6
+  (xx, yy, zz, xy, yz, zx); sig (n,) nominal stress in Pa, tension positive; state (m,); both changed in place.
+- par (k,) from `pack`; length: the element's characteristic length in m.
+- tangent (n, n) gets d sig / d deps of this very increment; with shape (0, 0) it is not computed.
+- returns 0, or a code of `law.py` above 0; then sig and state are as they were.
+
+To add a law: write `<name>.py` with `update_<name>` and a `Law` record with a free id (below), import both here, add
+the record to `_RECORDS` and a branch to `update` (and to `prepare`, if the law has derived values). State index 0 is
+the equivalent plastic strain, index 1 the damage, where they exist.
+
+ids: 0 elastic, 1 j2, 2 mohr-coulomb, 3 drucker-prager, 4 lubliner, 5 erve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graben.mechanics.compiled import kernel
+from graben.mechanics.materials.drucker_prager import (
+    DRUCKER_PRAGER,
+    prepare_drucker_prager,
+    update_drucker_prager,
+)
+from graben.mechanics.materials.elastic import ELASTIC, update_elastic
+from graben.mechanics.materials.law import UNKNOWN_LAW, Law
+
+_RECORDS: tuple[Law, ...] = (ELASTIC, DRUCKER_PRAGER)
+
+LAWS: dict[str, Law] = {record.name: record for record in _RECORDS}
+
+
+@kernel(error_model="numpy")
+def update(law_id, deps, sig, state, par, length, tangent):
+    """Advance one material point by a strain increment under the law of that id; see the module's contract."""
+    if law_id == 3:
+        return update_drucker_prager(deps, sig, state, par, length, tangent)
+    if law_id == 0:
+        return update_elastic(deps, sig, state, par, length, tangent)
+    return UNKNOWN_LAW
+
+
+@kernel(error_model="numpy")
+def prepare(law_id, par):
+    """Fill the derived slots of par after its parameters changed (a search changes them in compiled code)."""
+    if law_id == 3:
+        prepare_drucker_prager(par)
+
+
+def find(name: str) -> Law:
+    """The law of that name; ValueError that lists the known ones."""
+    if name not in LAWS:
+        raise ValueError(f"no law {name!r}; known: {', '.join(sorted(LAWS))}")
+    return LAWS[name]
+
+
+def pack(name: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Named parameters in SI -> par of the law of that name; ValueError that lists every fault."""
+    return find(name).pack(values)
