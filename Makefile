@@ -29,8 +29,8 @@ $(READY): pyproject.toml constraints.txt
 
 .PHONY: demo
 demo: $(READY) ## both chains at draft fidelity, one table, pictures (under 10 minutes)
-	@$(MAKE) --no-print-directory -j2 RESULTS=$(RESULTS)/demo FIDELITY=draft upscaling wear
-	@$(BIN)/python -m pipelines.summary $(RESULTS)/demo
+	@$(MAKE) --no-print-directory -j2 FIDELITY=draft upscaling wear
+	@$(BIN)/python pipelines/summary.py table $(RESULTS)
 
 .PHONY: test
 test: $(READY) ## the tests (under 12 minutes, compilation included)

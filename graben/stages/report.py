@@ -1,0 +1,77 @@
+"""graben report: one self-contained HTML page for all artifacts of a folder."""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from graben.schemas.artifact import read_artifact
+from graben.schemas.faults import BadInput, Fault
+from graben.schemas.files import refuse_existing, whole_file
+from graben.schemas.kinds import LAYOUTS
+from graben.stages import picture
+from graben.stages.record import Progress, silent
+
+_STYLE = (
+    "body{font:15px/1.45 sans-serif;max-width:62em;margin:2em auto;padding:0 1em;color:#222}"
+    "img{max-width:100%;border:1px solid #ddd}table{border-collapse:collapse;margin:.7em 0}"
+    "td{padding:.15em .9em .15em 0;vertical-align:top;font-size:90%}td:first-child{color:#666}"
+    "pre{background:#f6f6f4;padding:.7em;overflow:auto;font-size:85%}h2{margin-top:2em}"
+)
+
+
+def run(folder: Path, output: Path, *, overwrite: bool = False, progress: Progress = silent) -> dict[str, Any]:
+    """Draw every artifact (*.nc) of `folder` and write the page.
+
+    Raises
+    ------
+    BadInput : no artifact there, one with faults, or the page exists
+    """
+    if output.suffix not in (".html", ".htm"):
+        raise BadInput(Fault(str(output), "", "", "a page name ending in .html"))
+    refuse_existing(output, overwrite)
+    artifacts = sorted(folder.glob("*.nc"))
+    if not artifacts:
+        raise BadInput(Fault(str(folder), "", "", "a folder with artifacts (*.nc)"))
+    sections = []
+    with tempfile.TemporaryDirectory() as scratchpad:
+        for number, artifact in enumerate(artifacts):
+            progress(number / len(artifacts), artifact.name)
+            drawn = Path(scratchpad) / (artifact.stem + ".png")
+            picture.run(artifact, drawn)
+            sections.append(_section(artifact, drawn.read_bytes()))
+    title = f"graben: {folder.name}"
+    body = "\n".join(sections)
+    page = (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
+        f"<style>{_STYLE}</style></head><body><h1>{html.escape(title)}</h1>\n"
+        + "\n".join(sections)
+        + "\n</body></html>\n"
+    )
+    with whole_file(output) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    return {"report": str(output), "artifacts": len(artifacts)}
+
+
+def _section(artifact: Path, png: bytes) -> str:
+    attributes = read_artifact(artifact, LAYOUTS).attrs
+    cost = json.loads(attributes["cost"])
+    inputs = json.loads(attributes["inputs"])
+    facts = {
+        "kind": f"{attributes['schema_kind']} (layout {attributes['schema_version']})",
+        "made by": f"{attributes['software']} {attributes['software_version']} on {attributes['machine']}",
+        **{f"input {Path(name).name}": f"SHA-256 {digest[:16]}..." for name, digest in inputs.items()},
+        **{key: f"{value:.6g}" if isinstance(value, float) else value for key, value in cost.items()},
+    }
+    rows = "".join(f"<tr><td>{html.escape(k)}</td><td>{html.escape(str(v))}</td></tr>" for k, v in facts.items())
+    scene = attributes["scene"]
+    text = f"<details><summary>scene</summary><pre>{html.escape(scene)}</pre></details>" if scene else ""
+    image = base64.b64encode(png).decode()
+    return (
+        f"<h2>{html.escape(artifact.stem)}</h2><p>{html.escape(attributes['title'])}</p>"
+        f'<img alt="{html.escape(artifact.stem)}" src="data:image/png;base64,{image}"><table>{rows}</table>{text}'
+    )

@@ -1,0 +1,52 @@
+# Up-scaling: blocks at each confinement -> averages -> calibrated law -> slope. Included by the Makefile.
+# Each stage leaves NAME.nc and NAME.json (its headline numbers); VTU and PVD files lie beside them.
+
+UP           := $(RESULTS)/upscaling
+UP_SCENES    := pipelines/upscaling
+CONFINING    ?= 0.5 1 2 4
+UP_RADIUS    ?= 4 m
+UP_RUNS      := $(CONFINING:%=$(UP)/blocks-%MPa.nc)
+UP_CURVES    := $(CONFINING:%=$(UP)/curves-%MPa.nc)
+UP_PICTURES  := $(UP)/blocks-$(firstword $(CONFINING))MPa.png $(UP)/rev-study.png \
+                $(UP)/calibration.png $(UP)/calibration-udec.png $(UP)/slope.png
+UP_ARTIFACTS := $(UP_RUNS) $(UP_CURVES) $(UP)/rev-study.nc $(UP)/calibration.nc $(UP)/calibration-udec.nc $(UP)/slope.nc
+
+.PHONY: upscaling
+upscaling: $(UP)/summary.json $(UP_PICTURES) ## the up-scaling chain: blocks, averages, law, slope
+
+# Rewritten only when the fidelity changes, so that a change of it reruns the chain.
+$(UP)/.fidelity: FORCE
+	@mkdir -p $(@D); [ "$$(cat $@ 2>/dev/null)" = "$(FIDELITY)" ] || echo "$(FIDELITY)" > $@
+
+.PHONY: FORCE
+FORCE:
+
+# $(call stage,COMMAND): run a stage for target $@ and keep its headline numbers beside it.
+define stage
+	$(BIN)/$(1) -o $@ --overwrite --json > $(@:.nc=.json.part)
+	@mv $(@:.nc=.json.part) $(@:.nc=.json)
+endef
+
+$(UP)/blocks-%MPa.nc: $(UP_SCENES)/voronoi-granite.toml $(UP)/.fidelity | $(READY)
+	$(call stage,dem-run $< --set fidelity=$(FIDELITY) --set 'loading.confining_pressure="$* MPa"')
+
+$(UP)/curves-%MPa.nc: $(UP)/blocks-%MPa.nc
+	$(call stage,homogenize $< --radius "$(UP_RADIUS)")
+
+$(UP)/rev-study.nc: $(UP_SCENES)/rev-study.toml $(UP)/blocks-$(firstword $(CONFINING))MPa.nc
+	$(call stage,rev-study $(UP)/blocks-$(firstword $(CONFINING))MPa.nc --scene $<)
+
+$(UP)/calibration.nc: $(UP_SCENES)/calibrate.toml $(UP_CURVES)
+	$(call stage,calibrate $< $(UP_CURVES) --set fidelity=$(FIDELITY))
+
+$(UP)/calibration-udec.nc: $(UP_SCENES)/calibrate-udec.toml $(UP_SCENES)/reference/udec_voronoi_granite_fit.csv | $(READY)
+	$(call stage,calibrate $<)
+
+$(UP)/slope.nc: $(UP_SCENES)/slope.toml $(UP)/calibration.nc
+	$(call stage,fem-run $< --material $(UP)/calibration.material.toml --set fidelity=$(FIDELITY))
+
+$(UP)/%.png: $(UP)/%.nc
+	$(BIN)/graben show $< -o $@ --overwrite -q
+
+$(UP)/summary.json: $(UP_ARTIFACTS) pipelines/summary.py
+	$(BIN)/python pipelines/summary.py write upscaling $(@D)
