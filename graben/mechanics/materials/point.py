@@ -1,0 +1,294 @@
+"""One material point along a path of prescribed strains and stresses, in any mix.
+
+Each component is under strain control or stress control. An increment prescribes the change of the controlled
+quantity; the strains under stress control follow by Newton with the law's own tangent. An increment that does not converge
+is halved, down to a smallest one; where that fails too the path has no solution there (a damaged point cannot
+carry the prescribed stress): the driver stops, keeps what it reached and says how far it came.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graben.mechanics.compiled import kernel
+from graben.mechanics.materials.law import OK
+from graben.mechanics.materials.laws import find, update
+
+SMALLEST = 2.0**-12  # of an increment; below it the path counts as without solution
+_NEWTON = 12
+
+
+@kernel(error_model="numpy")
+def solve_small(a, b, m):
+    """Solve a[:m, :m] x = b[:m] by elimination with pivoting, x into b. False when singular."""
+    for i in range(m):
+        pivot = i
+        for r in range(i + 1, m):
+            if abs(a[r, i]) > abs(a[pivot, i]):
+                pivot = r
+        if not abs(a[pivot, i]) > 0.0:
+            return False
+        if pivot != i:
+            for c in range(i, m):
+                a[i, c], a[pivot, c] = a[pivot, c], a[i, c]
+            b[i], b[pivot] = b[pivot], b[i]
+        for r in range(i + 1, m):
+            ratio = a[r, i] / a[i, i]
+            if ratio != 0.0:
+                for c in range(i, m):
+                    a[r, c] -= ratio * a[i, c]
+                b[r] -= ratio * b[i]
+    for i in range(m - 1, -1, -1):
+        for c in range(i + 1, m):
+            b[i] -= a[i, c] * b[c]
+        b[i] /= a[i, i]
+        if not abs(b[i]) < 1e100:
+            return False
+    return True
+
+
+@kernel(error_model="numpy")
+def increment(
+    law_id, par, length, tolerance, free, m, change, sig, state, eps, tangent, old_sig, old_state, deps, a, b
+):
+    """One increment: change[i] is the strain change, or the new stress of a component under stress control.
+
+    free[:m] lists the components under stress control. tangent holds the one of the last increment (the predictor) and gets the
+    new one. sig, state, eps change in place on success; on failure they are as before and False is returned.
+    """
+    n = sig.shape[0]
+    for i in range(n):
+        old_sig[i] = sig[i]
+        deps[i] = change[i]
+    for i in range(state.shape[0]):
+        old_state[i] = state[i]
+    scale = 0.0
+    for i in range(m):
+        deps[free[i]] = 0.0
+    for i in range(n):
+        scale = max(scale, abs(sig[i]))
+    for i in range(m):
+        scale = max(scale, abs(change[free[i]]))
+    # predictor: what the last tangent makes of the prescribed changes
+    if m > 0:
+        for i in range(m):
+            row = free[i]
+            known = change[row] - sig[row]
+            for j in range(n):
+                known -= tangent[row, j] * deps[j]
+            b[i] = known
+            for j in range(m):
+                a[i, j] = tangent[row, free[j]]
+        if solve_small(a, b, m):
+            for i in range(m):
+                deps[free[i]] = b[i]
+    for _iteration in range(_NEWTON):
+        code = update(law_id, deps, sig, state, par, length, tangent)
+        if code != OK:
+            break
+        worst = 0.0
+        size = scale
+        for i in range(n):
+            size = max(size, abs(sig[i]))
+        for i in range(m):
+            miss = abs(change[free[i]] - sig[free[i]])
+            worst = max(worst, miss) if miss == miss else np.inf
+        if worst <= tolerance * size:
+            for i in range(n):
+                eps[i] += deps[i]
+            return True
+        for i in range(m):
+            row = free[i]
+            b[i] = change[row] - sig[row]
+            for j in range(m):
+                a[i, j] = tangent[row, free[j]]
+        for i in range(n):
+            sig[i] = old_sig[i]
+        for i in range(state.shape[0]):
+            state[i] = old_state[i]
+        if not solve_small(a, b, m):
+            break
+        for i in range(m):
+            deps[free[i]] += b[i]
+    for i in range(n):
+        sig[i] = old_sig[i]
+    for i in range(state.shape[0]):
+        state[i] = old_state[i]
+    return False
+
+
+@kernel(error_model="numpy")
+def drive(
+    law_id, par, length, tolerance, parts, control, targets, sig, state, eps, stress_out, strain_out, state_out
+):
+    """Follow one path from its present state; returns how many rows of targets were reached (a fraction counts).
+
+    control (n,) is 1 under stress control, else 0. targets (rows, n): row 0 is where the path stands, each later row the strain
+    (engineering shear) or stress to reach. parts: increments per row. sig, eps (n,) and state (m,) are the present
+    values and change in place. Outputs (rows, ...) get row 0 as it stands; rows beyond the end hold the last state.
+    state_out may have 0 rows.
+    """
+    rows, n = targets.shape
+    free = np.empty(n, np.int64)
+    m = 0
+    for i in range(n):
+        if control[i] == 1:
+            free[m] = i
+            m += 1
+    work = np.empty((4, n))
+    change, deps, b, old_sig = work[0], work[1], work[2], work[3]
+    old_state = np.empty(state.shape[0])
+    a = np.empty((n, n))
+    tangent = np.empty((n, n))
+    # the elastic tangent, or the reloading one, as the first predictor
+    change[:] = 0.0
+    for i in range(n):
+        old_sig[i] = sig[i]
+    for i in range(state.shape[0]):
+        old_state[i] = state[i]
+    alive = update(law_id, change, sig, state, par, length, tangent) == OK
+    for i in range(n):
+        sig[i] = old_sig[i]
+    for i in range(state.shape[0]):
+        state[i] = old_state[i]
+    reached = 0.0
+    for row in range(rows):
+        if row > 0 and alive:
+            done = 0.0
+            size = 1.0 / parts
+            while done < 1.0:
+                if done + size > 1.0 - 1e-12:
+                    size = 1.0 - done
+                for i in range(n):
+                    now = targets[row - 1, i]
+                    full = targets[row, i] - now
+                    change[i] = now + (done + size) * full if control[i] == 1 else size * full
+                if increment(
+                    law_id, par, length, tolerance, free, m, change, sig, state, eps, tangent, old_sig, old_state,
+                    deps, a, b,
+                ):  # fmt: skip
+                    done += size
+                    size = min(2.0 * size, 1.0 / parts)
+                else:
+                    # the tangent of a failed trial is no predictor: take the one at rest
+                    for i in range(n):
+                        change[i] = 0.0
+                        old_sig[i] = sig[i]
+                    for i in range(state.shape[0]):
+                        old_state[i] = state[i]
+                    update(law_id, change, sig, state, par, length, tangent)
+                    for i in range(n):
+                        sig[i] = old_sig[i]
+                    for i in range(state.shape[0]):
+                        state[i] = old_state[i]
+                    size *= 0.5
+                    if size < SMALLEST / parts:
+                        alive = False
+                        break
+            reached = row - 1 + done if done < 1.0 else float(row)
+        for i in range(n):
+            stress_out[row, i] = sig[i]
+            strain_out[row, i] = eps[i]
+        if state_out.shape[0] > 0:
+            for i in range(state.shape[0]):
+                state_out[row, i] = state[i]
+    return reached
+
+
+@kernel(error_model="numpy")
+def drive_paths(law_id, par, length, tolerance, parts, control, targets, rows, sig, state, eps, stress, strain, states):
+    """`drive` for several paths: targets (paths, steps, n) of which rows[p] count; returns reached (paths,)."""
+    reached = np.empty(targets.shape[0])
+    for p in range(targets.shape[0]):
+        r = rows[p]
+        reached[p] = drive(
+            law_id, par, length, tolerance, parts, control[p], targets[p, :r], sig[p], state[p], eps[p],
+            stress[p, :r], strain[p, :r], states[p, :r],
+        )  # fmt: skip
+        for row in range(r, targets.shape[1]):
+            stress[p, row] = sig[p]
+            strain[p, row] = eps[p]
+            states[p, row] = state[p]
+    return reached
+
+
+@dataclass(frozen=True)
+class Response:
+    """What a point did along its paths.
+
+    stress (paths, steps, n) Pa, strain (paths, steps, n) with tensor shear, state (paths, steps, m); reached (paths,):
+    steps reached, the last one as a fraction; complete (paths,) whether the whole path has a solution. Steps
+    beyond `reached` repeat the last state.
+    """
+
+    stress: NDArray[np.float64]
+    strain: NDArray[np.float64]
+    state: NDArray[np.float64]
+    reached: NDArray[np.float64]
+    complete: NDArray[np.bool_]
+
+
+def follow(
+    law: str,
+    par: NDArray[np.float64],
+    control: str | list[str],
+    targets: NDArray[np.float64],
+    *,
+    length: float = 1.0,
+    stress: NDArray[np.float64] | None = None,
+    parts: int = 1,
+    tolerance: float = 1e-9,
+    rows: NDArray[np.int64] | None = None,
+) -> Response:
+    """Drive a point along paths.
+
+    Parameters
+    ----------
+    law, par : name of the law and its packed parameters (`laws.pack`)
+    control : one word over components, "e" strain and "s" stress, such as "seee"; or one word per path
+    targets : (paths, steps, n) or (steps, n), n 4 or 6; strain (tensor shear) or stress in Pa to reach at each step;
+        step 0 is where the path starts and nothing is done to get there
+    length : characteristic length in m, for laws with damage
+    stress : (paths, n) or (n,) stress at the start, default 0
+    parts : increments per step
+    tolerance : on the stress under stress control, relative to the largest stress
+    rows : (paths,) how many steps of each path count, default all
+
+    Raises ValueError for shapes that do not fit, unknown control letters or values that are not finite.
+    """
+    record = find(law)
+    goal = np.array(targets, dtype=np.float64)
+    if goal.ndim == 2:
+        goal = goal[None]
+    if goal.ndim != 3 or goal.shape[2] not in (4, 6) or goal.shape[1] < 1:
+        raise ValueError(f"targets: expected (paths, steps, 4 or 6), found {np.shape(targets)}")
+    paths, steps, n = goal.shape
+    count = np.full(paths, steps, np.int64) if rows is None else np.ascontiguousarray(rows, dtype=np.int64)
+    if count.shape != (paths,) or count.min() < 1 or count.max() > steps:
+        raise ValueError(f"rows: expected ({paths},) numbers from 1 to {steps}, found {rows!r}")
+    for p in range(paths):
+        if not np.isfinite(goal[p, : count[p]]).all():
+            raise ValueError(f"targets of path {p}: expected finite numbers")
+    words = [control] * paths if isinstance(control, str) else list(control)
+    if len(words) != paths or any(len(w) != n or set(w) - {"e", "s"} for w in words):
+        raise ValueError(f"control: expected {n} letters e or s for each of {paths} paths, found {control!r}")
+    flags = np.array([[1 if letter == "s" else 0 for letter in w] for w in words], dtype=np.int64)
+    for p in range(paths):  # engineering shear inside
+        goal[p, :, 3:] *= np.where(flags[p, 3:] == 1, 1.0, 2.0)
+    sig = np.zeros((paths, n)) if stress is None else np.array(np.broadcast_to(stress, (paths, n)), dtype=np.float64)
+    if parts < 1:
+        raise ValueError(f"parts: expected at least 1, found {parts}")
+    eps = np.where(flags == 1, 0.0, goal[:, 0])
+    start = record.initial_state(par)
+    state = np.repeat(start[None], paths, axis=0)
+    out_stress, out_strain = np.empty((paths, steps, n)), np.empty((paths, steps, n))
+    out_state = np.empty((paths, steps, start.size))
+    reached = drive_paths(
+        record.id, par, float(length), float(tolerance), int(parts), flags, goal, count, sig, state, eps,
+        out_stress, out_strain, out_state,
+    )  # fmt: skip
+    out_strain[:, :, 3:] *= 0.5
+    return Response(out_stress, out_strain, out_state, reached, reached >= count - 1)
