@@ -48,9 +48,7 @@ def run(folder: Path, output: Path, *, overwrite: bool = False, progress: Progre
     body = "\n".join(sections)
     page = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
-        f"<style>{_STYLE}</style></head><body><h1>{html.escape(title)}</h1>\n"
-        + "\n".join(sections)
-        + "\n</body></html>\n"
+        f"<style>{_STYLE}</style></head><body><h1>{html.escape(title)}</h1>\n{body}\n</body></html>\n"
     )
     with whole_file(output) as temporary:
         temporary.write_text(page, encoding="utf-8")

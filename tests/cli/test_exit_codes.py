@@ -1,0 +1,91 @@
+"""0 done, 2 bad input, 3 numerics, 130 interrupted; a traceback only with --debug."""
+
+import json
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from graben.cli.options import Session, Tool, session_options, stage_options
+from graben.mechanics.failure import NumericsFailed
+from graben.schemas.faults import BadInput, Fault, NotFinite
+
+
+def tool(body):
+    @click.command("sample", cls=Tool)
+    @session_options
+    def main(session: Session) -> None:
+        session.report(body() or {})
+
+    return main
+
+
+def raiser(error):
+    def body():
+        raise error
+
+    return body
+
+
+TWO_FAULTS = BadInput([Fault("a.toml", "seed", "-1", "0 or more"), Fault("a.toml", "E", "'x'", "a pressure")])
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "words"),
+    [
+        (
+            TWO_FAULTS,
+            2,
+            ["sample: a.toml: seed = -1: expected 0 or more", "E = 'x': expected a pressure"],
+        ),
+        (
+            NumericsFailed("energy error 9 %", where="block 12", step=40, advice="halve the time step"),
+            3,
+            ["energy error 9 % at block 12 in step 40; halve the time step"],
+        ),
+        (NotFinite("stress holds nan"), 3, ["stress holds nan"]),
+        (KeyboardInterrupt(), 130, ["interrupted"]),
+        (ZeroDivisionError("1/0"), 1, ["a fault of the program", "--debug"]),
+    ],
+)
+def test_each_failure_has_its_exit_code_and_its_words(error, code, words):
+    result = CliRunner().invoke(tool(raiser(error)), [])
+    assert result.exit_code == code
+    assert "Traceback" not in result.output
+    for word in words:
+        assert word in result.stderr
+
+
+def test_debug_shows_the_error_itself():
+    result = CliRunner().invoke(tool(raiser(ZeroDivisionError("1/0"))), ["--debug"])
+    assert isinstance(result.exception, ZeroDivisionError)
+
+
+def test_json_is_one_object_on_stdout():
+    import numpy as np
+
+    body = lambda: {"peak_pa": np.float64(2.5), "rows": np.arange(2), "mixtures": [{"name": "a"}]}  # noqa: E731
+    result = CliRunner().invoke(tool(body), ["--json"])
+    assert json.loads(result.stdout) == {"peak_pa": 2.5, "rows": [0, 1], "mixtures": [{"name": "a"}]}
+
+
+def test_json_never_holds_nan():
+    result = CliRunner().invoke(tool(lambda: {"peak_pa": float("nan")}), ["--json"])
+    assert result.exit_code == 1
+    assert result.stdout == ""
+
+
+def test_people_get_aligned_lines_and_quiet_gets_none():
+    body = lambda: {"peak_pa": 2.5e6, "table": {"E": 1.0}, "mixtures": [{"name": "a", "rate": 1.0}]}  # noqa: E731
+    assert "peak_pa   2.5e+06" in CliRunner().invoke(tool(body), []).stdout
+    assert CliRunner().invoke(tool(body), ["-q"]).stdout == ""
+
+
+def test_a_stage_needs_an_output():
+    @click.command("sample", cls=Tool)
+    @stage_options
+    def main(session, output, overwrite): ...
+
+    result = CliRunner().invoke(main, [])
+    assert result.exit_code == 2
+    assert "--output" in result.stderr
