@@ -29,7 +29,7 @@ from __future__ import annotations
 import numpy as np
 
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.elastic import POISSON, YOUNG
+from graben.mechanics.materials.elastic import POISSON, YOUNG, finite
 from graben.mechanics.materials.j2 import HARDENING, fill_tangent, hardening_faults, return_to_table
 from graben.mechanics.materials.law import NOT_FINITE, OK, Law, Parameter
 
@@ -38,7 +38,7 @@ TABLE = 6
 FULL = 0.999  # H, algorithm 2
 
 
-@kernel
+@kernel(error_model="numpy")
 def effective_factor(damage, n):
     """Harmonic mean f_bar of f(d_i) = (1 - d_i)^2 over the n subdomains, H (6.87)."""
     total = 0.0
@@ -48,7 +48,7 @@ def effective_factor(damage, n):
     return n / total
 
 
-@kernel
+@kernel(error_model="numpy")
 def grow(damage, n, energy, threshold, step):
     """One damage step of the subdomains (in place), H algorithm 2. Returns the new f_bar."""
     total = 0.0
@@ -66,7 +66,7 @@ def grow(damage, n, energy, threshold, step):
     return effective_factor(damage, n)
 
 
-@kernel
+@kernel(error_model="numpy")
 def positive_part(stress, n, out):
     """Positive principal part of a stress (n,) into out (6,). Eigenvectors by numpy; shear order xy, yz, zx."""
     full = np.zeros((3, 3))
@@ -88,7 +88,7 @@ def positive_part(stress, n, out):
         out[5] += w * a * c
 
 
-@kernel
+@kernel(error_model="numpy")
 def elastic_energy(s, young, nu):
     """Energy density [Pa] of an elastic stress (6,): ((1 + nu) s:s - nu tr(s)^2) / (2 E)."""
     square = s[0] ** 2 + s[1] ** 2 + s[2] ** 2 + 2.0 * (s[3] ** 2 + s[4] ** 2 + s[5] ** 2)
@@ -96,13 +96,15 @@ def elastic_energy(s, young, nu):
     return ((1.0 + nu) * square - nu * trace * trace) / (2.0 * young)
 
 
-@kernel
+@kernel(error_model="numpy")
 def update_erve(deps, sig, state, par, length, tangent):
     """The law `erve`; arguments and return code as in `laws.update`. sig is the nominal stress.
 
     The tangent is that of the plastic step times f_bar: damage grows by a fixed step or not at all, so its
     derivative is zero almost everywhere.
     """
+    if not (finite(deps) and finite(sig)):
+        return NOT_FINITE
     n = deps.shape[0]
     young, nu, threshold, step = par[0], par[1], par[2], par[MAX_STEP]
     parts = int(par[3])
@@ -124,8 +126,6 @@ def update_erve(deps, sig, state, par, length, tangent):
     for i in range(3, n):
         trial[i] = eff[i] + shear * deps[i]
         square += 2.0 * trial[i] * trial[i]
-    if not square + abs(mean) < 1.0e300:
-        return NOT_FINITE
     q = np.sqrt(1.5 * square)
     scale = 1.0 if split == 2 else 1.0 / bar
     dp, slope = return_to_table(q, state[0], 3.0 * shear, par, TABLE, scale)

@@ -1,7 +1,8 @@
 """J2 (von Mises) plasticity with isotropic hardening from a table, radial return in closed form.
 
 Strength follows sigma_y(p), piecewise linear in the equivalent plastic strain p; beyond the last pair it stays
-constant. The return is exact: the segment of the solution is found by walking the table, and the increment solves ``q_trial - 3 G dp = sigma_y(p + dp)`` there, without iteration.
+constant. The return is exact: the segment of the solution is found by walking the table, and the increment
+solves ``q_trial - 3 G dp = sigma_y(p + dp)`` there, without iteration.
 
 Slots of ``par``: E [Pa], nu, count, then `count` pairs (p, sigma_y [Pa]); the first p is 0.
 State: equivalent plastic strain p.
@@ -15,13 +16,13 @@ from typing import Any
 import numpy as np
 
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.elastic import POISSON, YOUNG
+from graben.mechanics.materials.elastic import POISSON, YOUNG, finite
 from graben.mechanics.materials.law import NOT_FINITE, OK, Law, Parameter
 
 TABLE = 2  # where the hardening table starts in par: count, then pairs
 
 
-@kernel
+@kernel(error_model="numpy")
 def yield_stress(p, par, start):
     """Yield stress [Pa] at equivalent plastic strain p by the table at par[start:]."""
     count = int(par[start])
@@ -34,7 +35,7 @@ def yield_stress(p, par, start):
     return par[i + 2 * (count - 1) + 1]
 
 
-@kernel
+@kernel(error_model="numpy")
 def return_to_table(q_trial, p, three_g, par, start, scale):
     """Increment dp >= 0 that solves ``q_trial - three_g dp = scale * sigma_y(p + dp)``, and the slope there.
 
@@ -59,7 +60,7 @@ def return_to_table(q_trial, p, three_g, par, start, scale):
     return (q_trial - low) / three_g, 0.0
 
 
-@kernel
+@kernel(error_model="numpy")
 def fill_tangent(tangent, n, bulk, shear, theta, theta_bar, s, norm):
     """Consistent tangent ``K 1(x)1 + 2 G theta I_dev - 2 G theta_bar n(x)n`` for engineering shear strains.
 
@@ -77,9 +78,11 @@ def fill_tangent(tangent, n, bulk, shear, theta, theta_bar, s, norm):
             tangent[i, j] = value
 
 
-@kernel
+@kernel(error_model="numpy")
 def update_j2(deps, sig, state, par, length, tangent):
     """The law `j2`; arguments and return code as in `laws.update`. deps (n,), n = 4 or 6, engineering shears."""
+    if not (finite(deps) and finite(sig)):
+        return NOT_FINITE
     n = deps.shape[0]
     young, nu = par[0], par[1]
     shear = young / (2.0 * (1.0 + nu))
@@ -96,8 +99,6 @@ def update_j2(deps, sig, state, par, length, tangent):
         s = sig[i] + shear * deps[i]
         sig[i] = s
         square += 2.0 * s * s
-    if not square + abs(mean) < 1.0e300:
-        return NOT_FINITE
     q = np.sqrt(1.5 * square)
     dp, slope = return_to_table(q, state[0], 3.0 * shear, par, TABLE, 1.0)
     theta = 1.0

@@ -34,9 +34,11 @@ from graben.mechanics.materials.drucker_prager import (
     update_drucker_prager,
 )
 from graben.mechanics.materials.elastic import ELASTIC, update_elastic
+from graben.mechanics.materials.erve import ERVE, update_erve
+from graben.mechanics.materials.j2 import J2, update_j2
 from graben.mechanics.materials.law import UNKNOWN_LAW, Law
 
-_RECORDS: tuple[Law, ...] = (ELASTIC, DRUCKER_PRAGER)
+_RECORDS: tuple[Law, ...] = (ELASTIC, J2, DRUCKER_PRAGER, ERVE)
 
 LAWS: dict[str, Law] = {record.name: record for record in _RECORDS}
 
@@ -46,6 +48,10 @@ def update(law_id, deps, sig, state, par, length, tangent):
     """Advance one material point by a strain increment under the law of that id; see the module's contract."""
     if law_id == 3:
         return update_drucker_prager(deps, sig, state, par, length, tangent)
+    if law_id == 1:
+        return update_j2(deps, sig, state, par, length, tangent)
+    if law_id == 5:
+        return update_erve(deps, sig, state, par, length, tangent)
     if law_id == 0:
         return update_elastic(deps, sig, state, par, length, tangent)
     return UNKNOWN_LAW

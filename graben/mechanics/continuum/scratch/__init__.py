@@ -1,0 +1,1 @@
+"""Scratch test: 3D hexahedra, explicit in time, current configuration, contact with a rigid sphere."""
