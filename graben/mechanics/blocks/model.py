@@ -1,0 +1,290 @@
+"""A block model that can be stepped: properties, masses, constraints and loads around the compiled loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from graben.mechanics.blocks import relaxation as rx
+from graben.mechanics.blocks import search, zones
+from graben.mechanics.blocks.bodies import Bodies, Skin, chamfered_skin
+from graben.mechanics.blocks.joints import Joint, Pairs, node_motion
+from graben.mechanics.failure import NumericsFailed
+
+
+@dataclass(frozen=True)
+class Damping:
+    """How motion is damped.
+
+    ratio : adaptive global damping keeps its power at this ratio to the rate of kinetic energy; negative: the
+    coefficient `coefficient` [1/s] stays (0: none). local : share of the unbalanced force, 0 to 1.
+    """
+
+    ratio: float = 1.0
+    coefficient: float = 0.0
+    local: float = 0.0
+
+
+# Time step over the estimate 2 / omega of the stiffest vertex (row sums bound omega from above).
+SAFETY = 0.9
+
+
+class BlockModel:
+    """Elastic blocks with Coulomb joints.
+
+    Parameters: bodies; young [Pa], poisson, density [kg/m3]; joint; rounding [m] of corners.
+    dt : time step [s]. Given, masses follow from stiffness so that this step is stable everywhere (density scaling,
+    for slow loading); None: true masses, and dt from the estimate.
+    gravity : (gx, gy) [m/s2], always with true masses.
+    """
+
+    def __init__(
+        self,
+        bodies: Bodies,
+        *,
+        young: float,
+        poisson: float,
+        density: float,
+        joint: Joint,
+        rounding: float,
+        dt: float | None = None,
+        gravity: tuple[float, float] = (0.0, 0.0),
+        damping: Damping | None = None,
+        intact: bool = True,
+    ) -> None:
+        for name, value in (("young", young), ("density", density), ("kn", joint.normal_stiffness)):
+            if not value > 0.0:
+                raise ValueError(f"{name} must be positive, found {value}")
+        if not -1.0 < poisson < 0.5:
+            raise ValueError(f"poisson must lie between -1 and 0.5, found {poisson}")
+        self.bodies = bodies
+        self.joint = joint
+        self.damping = damping or Damping()
+        self.skin: Skin = chamfered_skin(bodies, rounding)
+        nv, nn = len(bodies.position), len(self.skin.first)
+        gradient, area = zones.shape_gradients(bodies.position, bodies.zone_vertex)
+        lam, mu = zones.lame(young, poisson)
+        lam_z, mu_z = np.full(len(area), lam), np.full(len(area), mu)
+        self.true_mass = np.bincount(
+            bodies.zone_vertex.ravel(), weights=np.repeat(density * area / 3.0, 3), minlength=nv
+        )
+        stiffness = self._vertex_stiffness(gradient, area, lam_z, mu_z)
+        if dt is None:
+            self.dt = float(SAFETY * np.sqrt(4.0 * self.true_mass / stiffness).min())
+            mass = self.true_mass.copy()
+        else:
+            self.dt = float(dt)
+            mass = stiffness * dt**2 / (4.0 * SAFETY**2)
+        self.mass_ratio = mass / self.true_mass
+        self.skeleton = rx.Skeleton(
+            bodies.zone_vertex,
+            gradient,
+            area,
+            lam_z,
+            mu_z,
+            self.skin.first,
+            self.skin.second,
+            self.skin.weight,
+            self.skin.follow,
+            mass,
+            np.zeros((nv, 2), dtype=np.int64),
+            np.zeros((nv, 2)),
+            self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :],
+            np.zeros((nv, 2)),
+        )
+        size = float(np.sqrt(np.median(bodies.block_area)))
+        self.block_size = size
+        self.reach = 0.15 * size
+        self.near = 0.012 * size
+        self.deepest = 0.1 * size
+        self.motion = rx.Motion(
+            bodies.position.copy(),
+            np.zeros((nv, 2)),
+            np.zeros((nv, 2)),
+            np.zeros((nv, 2)),
+            np.zeros((nv, 2)),
+            np.zeros((nn, 2)),
+            np.zeros((nn, 2)),
+            np.zeros((nn, 2)),
+            np.zeros((nn, 3)),
+            np.zeros((nn, 2)),
+            np.zeros((nn, 2)),
+            np.empty(0, dtype=np.int64),
+            np.zeros(1, dtype=np.int64),
+            np.zeros(8),
+            np.zeros(3),
+            np.zeros(5),
+        )
+        self.pairs: Pairs = search.no_pairs()
+        self.steps_done = 0
+        self.time = 0.0
+        self.rebuilds = 0
+        # A vertex that crosses a block in a few dozen steps has run away.
+        self.fastest = 0.02 * size / self.dt
+        self._low = bodies.position.min(axis=0) - size
+        self._span = np.ptp(bodies.position, axis=0) + 2.0 * size
+        self.motion.drive[rx.DAMPING] = (
+            self.damping.coefficient if self.damping.ratio < 0 else 0.01 / self.dt
+        )
+        self.rebuild(first=intact)
+
+    def _vertex_stiffness(self, gradient, area, lam, mu) -> np.ndarray:
+        """Bound on the stiffness that a vertex sees, from zones and from the joints along its edges [N/m per m]."""
+        rows = zones.stiffness_row_sums(gradient, area, lam, mu)
+        total = np.bincount(self.bodies.zone_vertex.ravel(), weights=rows.ravel())
+        b = self.bodies
+        length = np.linalg.norm(b.position[b.edge_to] - b.position[b.edge_from], axis=1)
+        # An edge holds half its length at each end, against another block: twice in a row sum. Sliding blocks
+        # can face two others, so the half counts in full.
+        k = 2.0 * max(self.joint.normal_stiffness, self.joint.shear_stiffness)
+        np.add.at(total, b.edge_from, k * length)
+        np.add.at(total, b.edge_to, k * length)
+        return total
+
+    def rebuild(self, first: bool = False) -> None:
+        """Find the candidate contacts anew; joints found at the `first` call are intact."""
+        m, s, skin = self.motion, self.skeleton, self.skin
+        node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.xn, m.vn, m.tangent)
+        if not np.all(np.isfinite(m.xn)):
+            raise NumericsFailed("a position is not finite", step=self.steps_done, advice=_SLOWER)
+        slid = float(np.abs(self.pairs.slip).max()) if len(self.pairs.slip) else 0.0
+        held = self.joint.dilation * min(slid, self.joint.dilation_limit)
+        cell = max(self.block_size, float(np.sqrt(self._span.prod() / (4.0 * len(s.first)))))
+        nx, ny = (int(n) for n in np.maximum(1, np.ceil(self._span / cell)))
+        keys = search.find_keys(
+            m.xn,
+            m.tangent,
+            s.follow,
+            skin.block,
+            self.reach + held,
+            self.deepest,
+            self._low,
+            cell,
+            nx,
+            ny,
+            self.pairs.key,
+            self.pairs.live,
+        )
+        self.pairs = search.carry_history(keys, len(s.first), self.pairs, 1 if first else 0)
+        active = np.empty(len(keys), dtype=np.int64)
+        m.built[:] = m.xn
+        m.chosen[:] = m.xn
+        self.motion = m._replace(active=active)
+        self.motion.active_count[0] = search.choose_active(
+            self.pairs, s.follow, m.xn, m.tangent, self.near, self.joint.dilation, active
+        )
+        self.rebuilds += 1
+
+    def advance(self, steps: int) -> None:
+        """Take `steps` time steps. Raises NumericsFailed when something runs away or blocks overlap too far."""
+        left = steps
+        while left > 0:
+            status, done, where = rx.advance(
+                left,
+                self.skeleton,
+                self.motion,
+                self.pairs,
+                self.joint,
+                self.dt,
+                self.reach,
+                self.near,
+                self.deepest,
+                self.damping.ratio,
+                0.5 / self.dt,
+                self.damping.local,
+                self.fastest,
+            )
+            left -= done
+            self.steps_done += done
+            self.time += done * self.dt
+            if status == rx.REBUILD:
+                if done == 0 and self._stuck():
+                    raise NumericsFailed("a position is not finite", step=self.steps_done, advice=_SLOWER)
+                self.rebuild()
+            elif status == rx.RUNAWAY:
+                block = int(self.bodies.vertex_block[where])
+                speed = float(np.hypot(*self.motion.v[where]))
+                raise NumericsFailed(
+                    f"speed {speed:.3g} m/s (limit {self.fastest:.3g} m/s)",
+                    where=f"block {block}",
+                    step=self.steps_done,
+                    advice=_SLOWER,
+                )
+            elif status == rx.DEEP_OVERLAP:
+                a, b = (int(self.skin.block[k[where]]) for k in (self.pairs.first, self.pairs.second))
+                raise NumericsFailed(
+                    f"overlap {self.motion.sums[rx.LARGEST_OVERLAP]:.3g} m (limit {self.deepest:.3g} m)",
+                    where=f"blocks {a} and {b}",
+                    step=self.steps_done,
+                    advice="raise the normal stiffness of the joints or take more steps",
+                )
+
+    def _stuck(self) -> bool:
+        return not bool(np.all(np.isfinite(self.motion.x)))
+
+    def hold(self, vertices: np.ndarray, axis: int, speed: float = 0.0) -> None:
+        """Prescribe the velocity [m/s] of vertices (indices or mask) along an axis (0: x, 1: y)."""
+        self.skeleton.held[vertices, axis] = 1
+        self.skeleton.wall[vertices, axis] = speed
+
+    def release(self, vertices: np.ndarray, axis: int) -> None:
+        """Let vertices move freely along an axis again."""
+        self.skeleton.held[vertices, axis] = 0
+        self.skeleton.wall[vertices, axis] = 0.0
+        self.motion.reaction[vertices, axis] = 0.0
+
+    def press(self, edges: np.ndarray, normal_stress: float, rising: bool = False) -> None:
+        """Add a normal stress [Pa, tension positive] on outline edges (indices or mask), as steady or rising load.
+
+        The force keeps the direction and the length that the edges have now.
+        """
+        b, x = self.bodies, self.motion.x
+        a, c = b.edge_from[edges], b.edge_to[edges]
+        d = x[c] - x[a]
+        half = 0.5 * normal_stress * np.column_stack([d[:, 1], -d[:, 0]])
+        target = self.skeleton.rising if rising else self.skeleton.steady
+        np.add.at(target, a, half)
+        np.add.at(target, c, half)
+
+    def unbalanced_ratio(self) -> float:
+        """Largest unbalanced force on a free vertex over the mean size of zone forces."""
+        s, m = self.skeleton, self.motion
+        load = s.steady + m.drive[rx.LOAD] * s.rising
+        total = np.where(s.held == 1, 0.0, m.zone_force + m.joint_force + load)
+        scale = float(np.abs(m.zone_force).mean())
+        return float(np.abs(total).max()) / scale if scale > 0.0 else np.inf
+
+    def zone_stress(self) -> np.ndarray:
+        """Cauchy stress (zones, 4) as xx, yy, zz, xy [Pa]."""
+        s = self.skeleton
+        return zones.zone_state(self.motion.x, s.triangles, s.gradient, s.area, s.lam, s.mu)[0]
+
+    def energies(self) -> dict[str, float]:
+        """Energy ledger [J per m of thickness]; error = work put in - everything accounted for."""
+        s, m, t = self.skeleton, self.motion, self.motion.tally
+        _, strain = zones.zone_state(m.x, s.triangles, s.gradient, s.area, s.lam, s.mu)
+        e = {
+            "kinetic": float(t[rx.KINETIC]),
+            "strain": strain,
+            "joint": float(m.sums[rx.STORED]),
+            "friction": float(m.sums[rx.FRICTION]),
+            "damping": float(t[rx.DAMPED]),
+            "boundary": float(t[rx.WALL_WORK]),
+            "external": float(t[rx.LOAD_WORK]),
+            "zone_work": float(t[rx.ZONE_WORK]),
+            "joint_work": float(t[rx.JOINT_WORK]),
+        }
+        e["error"] = (
+            e["boundary"]
+            + e["external"]
+            - e["kinetic"]
+            - e["strain"]
+            - e["joint"]
+            - e["friction"]
+            - e["damping"]
+        )
+        return e
+
+
+_SLOWER = "take more steps (slower loading or a smaller time step) or look at that block's shape"

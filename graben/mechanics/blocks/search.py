@@ -1,0 +1,177 @@
+"""Which edges of different blocks may touch: inflated edge boxes in cells, histories carried by a sorted key."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from graben.mechanics.blocks.joints import FACING_NONE, OPEN, Pairs
+from graben.mechanics.compiled import kernel
+
+
+@kernel
+def find_keys(xn, tangent, follow, block, reach, deepest, low, cell, nx, ny, old_key, old_live):
+    """Sorted keys of the edge pairs whose boxes, each grown by reach / 2, meet.
+
+    Left out: pairs of one block, pairs turned away from each other by more than reach can undo, and pairs that lie
+    behind each other (as seen through a thin block) unless they touch already.
+    low, cell, nx, ny : the search cells; positions beyond them count as in the border cells.
+    """
+    n = follow.shape[0]
+    box = np.empty((n, 4))
+    cells = np.empty((n, 4), dtype=np.int64)
+    half = 0.5 * reach
+    start = np.zeros(nx * ny + 1, dtype=np.int64)
+    for e in range(n):
+        f = follow[e]
+        for d in range(2):
+            box[e, d] = min(xn[e, d], xn[f, d]) - half
+            box[e, 2 + d] = max(xn[e, d], xn[f, d]) + half
+        cells[e, 0] = min(max(int((box[e, 0] - low[0]) / cell), 0), nx - 1)
+        cells[e, 1] = min(max(int((box[e, 1] - low[1]) / cell), 0), ny - 1)
+        cells[e, 2] = min(max(int((box[e, 2] - low[0]) / cell), 0), nx - 1)
+        cells[e, 3] = min(max(int((box[e, 3] - low[1]) / cell), 0), ny - 1)
+        for iy in range(cells[e, 1], cells[e, 3] + 1):
+            for ix in range(cells[e, 0], cells[e, 2] + 1):
+                start[iy * nx + ix + 1] += 1
+    for k in range(nx * ny):
+        start[k + 1] += start[k]
+    entry = np.empty(start[nx * ny], dtype=np.int64)
+    fill = start[:-1].copy()
+    for e in range(n):
+        for iy in range(cells[e, 1], cells[e, 3] + 1):
+            for ix in range(cells[e, 0], cells[e, 2] + 1):
+                entry[fill[iy * nx + ix]] = e
+                fill[iy * nx + ix] += 1
+    keys = np.empty(4 * n + 16, dtype=np.int64)
+    count = 0
+    for iy in range(ny):
+        for ix in range(nx):
+            k = iy * nx + ix
+            for a in range(start[k], start[k + 1]):
+                e = entry[a]
+                for b in range(a + 1, start[k + 1]):
+                    f = entry[b]
+                    if block[e] == block[f]:
+                        continue
+                    # A pair that shares several cells counts in the first of them only.
+                    if max(cells[e, 0], cells[f, 0]) != ix or max(cells[e, 1], cells[f, 1]) != iy:
+                        continue
+                    if (
+                        box[e, 0] > box[f, 2]
+                        or box[f, 0] > box[e, 2]
+                        or box[e, 1] > box[f, 3]
+                        or box[f, 1] > box[e, 3]
+                    ):
+                        continue
+                    key = min(e, f) * n + max(e, f)
+                    facing = -(tangent[e, 0] * tangent[f, 0] + tangent[e, 1] * tangent[f, 1])
+                    slack = 2.0 * reach / min(tangent[e, 2], tangent[f, 2])
+                    if facing < FACING_NONE - slack:
+                        continue
+                    if _middle_gap(xn, follow, e, f) < -deepest - reach:
+                        m = np.searchsorted(old_key, key)
+                        if m >= old_key.shape[0] or old_key[m] != key or old_live[m] == 0:
+                            continue
+                    if count == keys.shape[0]:
+                        larger = np.empty(2 * count, dtype=np.int64)
+                        larger[:count] = keys
+                        keys = larger
+                    keys[count] = key
+                    count += 1
+    return np.sort(keys[:count])
+
+
+@kernel
+def _middle_gap(xn, follow, e, f):
+    """Largest distance of either edge's ends in front of the other edge [m]; negative when behind."""
+    gap = -1e300
+    for turn in range(2):
+        p = e if turn == 0 else f
+        q = f if turn == 0 else e
+        p2 = follow[p]
+        q2 = follow[q]
+        dx = xn[p2, 0] - xn[p, 0]
+        dy = xn[p2, 1] - xn[p, 1]
+        inverse = 1.0 / np.sqrt(dx * dx + dy * dy)
+        g0 = ((xn[q, 0] - xn[p, 0]) * dy - (xn[q, 1] - xn[p, 1]) * dx) * inverse
+        g1 = ((xn[q2, 0] - xn[p, 0]) * dy - (xn[q2, 1] - xn[p, 1]) * dx) * inverse
+        gap = max(gap, g0, g1)
+    return gap
+
+
+@kernel
+def carry_history(keys, nodes, old, intact):
+    """Candidate arrays for `keys`, with the history of those that were candidates before."""
+    n = keys.shape[0]
+    first = np.empty(n, dtype=np.int64)
+    second = np.empty(n, dtype=np.int64)
+    shear = np.zeros((n, 2))
+    slip = np.zeros((n, 2))
+    flag = np.full((n, 2), OPEN, dtype=np.int64)
+    live = np.zeros(n, dtype=np.int64)
+    whole = np.full(n, intact, dtype=np.int64)
+    m = 0
+    for k in range(n):
+        first[k] = keys[k] // nodes
+        second[k] = keys[k] % nodes
+        while m < old.key.shape[0] and old.key[m] < keys[k]:
+            m += 1
+        if m < old.key.shape[0] and old.key[m] == keys[k]:
+            for d in range(2):
+                shear[k, d] = old.shear[m, d]
+                slip[k, d] = old.slip[m, d]
+                flag[k, d] = old.flag[m, d]
+            live[k] = old.live[m]
+            whole[k] = old.intact[m]
+    return Pairs(keys, first, second, shear, slip, flag, live, whole)
+
+
+def no_pairs() -> Pairs:
+    """An empty set of candidates."""
+    i, f = np.empty(0, dtype=np.int64), np.empty((0, 2))
+    return Pairs(i, i.copy(), i.copy(), f, f.copy(), np.empty((0, 2), dtype=np.int64), i.copy(), i.copy())
+
+
+@kernel
+def choose_active(pairs, follow, xn, tangent, reach, dilation, active):
+    """Candidates that can touch before any node moves by reach / 2; the others sleep. Returns their number.
+
+    A pair sleeps when it is too far apart along its normal or along its tangent, or turned away; what it remembers
+    of shear is then wiped, as for any open contact. dilation : tangent; slid joints push before they overlap.
+    """
+    count = 0
+    for c in range(pairs.key.shape[0]):
+        e = pairs.first[c]
+        f = pairs.second[c]
+        facing = -(tangent[e, 0] * tangent[f, 0] + tangent[e, 1] * tangent[f, 1])
+        slack = 2.0 * reach / min(tangent[e, 2], tangent[f, 2])
+        awake = facing > FACING_NONE - slack
+        if awake and facing > -0.9:
+            scale = 1.0 / np.sqrt(2.0 + 2.0 * facing)
+            tx = (tangent[e, 0] - tangent[f, 0]) * scale
+            ty = (tangent[e, 1] - tangent[f, 1]) * scale
+            ox = xn[e, 0]
+            oy = xn[e, 1]
+            f2 = follow[f]
+            along = tangent[e, 0] * tx + tangent[e, 1] * ty
+            se = tangent[e, 2] * along
+            rise = tangent[e, 2] * (tangent[e, 0] * ty - tangent[e, 1] * tx)
+            s0 = (xn[f, 0] - ox) * tx + (xn[f, 1] - oy) * ty
+            s1 = (xn[f2, 0] - ox) * tx + (xn[f2, 1] - oy) * ty
+            h0 = (xn[f, 0] - ox) * ty - (xn[f, 1] - oy) * tx
+            h1 = (xn[f2, 0] - ox) * ty - (xn[f2, 1] - oy) * tx
+            length = min(se, s0) - max(0.0, s1)
+            held = dilation * max(abs(pairs.slip[c, 0]), abs(pairs.slip[c, 1]))
+            # A turn of the tangent shifts ends by at most their distance times the turn.
+            far = reach * (1.0 + (abs(h0) + abs(h1)) / min(tangent[e, 2], tangent[f, 2]))
+            if length < -2.0 * far or min(h0, h1) - max(0.0, rise) > 2.0 * far + held:
+                awake = False
+        if awake:
+            active[count] = c
+            count += 1
+        else:
+            for d in range(2):
+                pairs.shear[c, d] = 0.0
+                pairs.flag[c, d] = OPEN
+            pairs.live[c] = 0
+    return count

@@ -1,0 +1,258 @@
+"""Voronoi blocks in a simple polygon, with Lloyd passes and short edges collapsed.
+
+A Voronoi diagram of Lloyd-relaxed seeds has many very short edges, which carry next to no contact and spoil
+zones and time steps. They are collapsed, shortest first, the ones that the outline cuts included; that is also what
+brings the blocks to the corner statistics of the reference model (4.3 to 4.4 corners a block).
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import Voronoi, cKDTree
+
+from graben.mechanics.blocks import polygons
+
+# Mean block area over the square of the nominal edge: UDEC's generator made 419 blocks on 100 m2 for 0.5 m.
+AREA_PER_EDGE_SQUARED = 100.0 / 419.0 / 0.25
+# An edge is not collapsed where a block would get a corner that turns inwards by more than asin of this.
+_REFLEX_SINE = 0.05
+# ... or a corner sharper than asin of this: a needle would carry a huge scaled mass.
+_NEEDLE_SINE = 0.17
+
+
+@dataclass(frozen=True)
+class Tessellation:
+    """Blocks that fill an outline; blocks share points here, and part when zones are made.
+
+    points : (p, 2) [m]; start : (blocks + 1,); corner : indices into points, counter-clockwise per block;
+    outline : (m, 2) [m] counter-clockwise.
+    """
+
+    points: np.ndarray
+    start: np.ndarray
+    corner: np.ndarray
+    outline: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Number of blocks."""
+        return len(self.start) - 1
+
+    def statistics(self) -> dict[str, float]:
+        """Corner shares, area quantiles (inner blocks: none on the outline) and edge lengths, SI units."""
+        counts = np.diff(self.start)
+        area, _ = polygons.areas_and_centroids(self.points, self.start, self.corner)
+        tolerance = 1e-6 * np.ptp(self.outline, axis=0).max()
+        on_side = polygons.distance_to_sides(self.points, self.outline).min(axis=1) < tolerance
+        inner = ~np.logical_or.reduceat(on_side[self.corner], self.start[:-1])
+        following = np.arange(1, len(self.corner) + 1)
+        following[self.start[1:] - 1] = self.start[:-1]
+        edge = np.linalg.norm(self.points[self.corner[following]] - self.points[self.corner], axis=1)
+        pool = area[inner] if inner.any() else area
+        result = {"blocks": float(self.size), "corners_mean": float(counts.mean())}
+        for n in (3, 4, 5, 6):
+            result[f"share_{n}_corners"] = float((counts == n).mean())
+        for q in (5, 50, 95):
+            result[f"inner_area_q{q:02d}_m2"] = float(np.percentile(pool, q))
+        result["area_min_m2"] = float(area.min())
+        result["area_max_m2"] = float(area.max())
+        result["edge_min_m"] = float(edge.min())
+        result["edge_mean_m"] = float(edge.mean())
+        return result
+
+
+def voronoi_blocks(
+    outline: np.ndarray,
+    edge: float,
+    seed: int,
+    lloyd_passes: int = 4,
+    shortest_edge: float | None = None,
+    count: int | None = None,
+) -> Tessellation:
+    """Blocks by a Voronoi diagram of random seeds, relaxed by Lloyd passes (each seed to its cell's centroid).
+
+    outline : (m, 2) simple polygon [m], any direction; edge : nominal edge [m]; shortest_edge : edges below are
+    collapsed [m], by default 0.48 edge; count : number of seeds, by default from `edge` as UDEC's generator.
+    Raises ValueError on an outline that is not simple or is too thin for the block size.
+    """
+    outline = np.asarray(outline, dtype=float)
+    if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
+        raise ValueError(f"outline: expected (m, 2) with m >= 3, found shape {outline.shape}")
+    if not polygons.is_simple(outline):
+        raise ValueError("outline: two of its sides cross or touch")
+    area = polygons.signed_area(outline)
+    if area < 0.0:
+        outline, area = outline[::-1].copy(), -area
+    n = count if count is not None else round(area / (AREA_PER_EDGE_SQUARED * edge**2))
+    if n < 1:
+        raise ValueError(f"outline of {area:.3g} m2 is too small for blocks of edge {edge:.3g} m")
+    limit = 0.48 * edge if shortest_edge is None else shortest_edge
+    seeds = _random_points(outline, n, np.random.Generator(np.random.PCG64(seed)))
+    for _ in range(lloyd_passes):
+        points, start, corner = _cells(seeds, outline)
+        _, seeds = polygons.areas_and_centroids(points, start, corner)
+    tessellation = _conforming(*_cells(seeds, outline), outline)
+    return collapse_short_edges(tessellation, limit)
+
+
+def from_polygons(shapes: list[np.ndarray], outline: np.ndarray) -> Tessellation:
+    """A tessellation from given counter-clockwise polygons, for instance a regular block pattern."""
+    start = np.concatenate([[0], np.cumsum([len(s) for s in shapes])])
+    return _conforming(np.vstack(shapes), start, np.arange(start[-1]), np.asarray(outline, float), check=False)
+
+
+def _random_points(outline: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    found = np.empty((0, 2))
+    while len(found) < n:
+        trial = low + (high - low) * rng.random((n, 2))
+        found = np.vstack([found, trial[polygons.inside(trial, outline)]])
+    return found[:n]
+
+
+def _cells(seeds: np.ndarray, outline: np.ndarray):
+    """Voronoi cells clipped by the outline, as ragged polygons that do not yet share points."""
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    centre, reach = 0.5 * (low + high), float(np.max(high - low))
+    angle = np.arange(8) * (np.pi / 4.0)
+    ghosts = centre + 20.0 * reach * np.column_stack([np.cos(angle), np.sin(angle)])
+    diagram = Voronoi(np.vstack([seeds, ghosts]))
+    vertex_inside = polygons.inside(diagram.vertices, outline)
+    # A cell can hold a corner of the outline although all its own corners lie inside.
+    touched = set(cKDTree(seeds).query(outline)[1].tolist())
+    shapes = []
+    for k, region in enumerate(diagram.point_region[: len(seeds)]):
+        index = np.array(diagram.regions[region])
+        xy = diagram.vertices[index]
+        turn = np.argsort(np.arctan2(xy[:, 1] - seeds[k, 1], xy[:, 0] - seeds[k, 0]), kind="stable")
+        xy = xy[turn]
+        if k in touched or not vertex_inside[index].all():
+            xy = polygons.clip_to_convex(outline, xy)
+        shapes.append(xy)
+    start = np.concatenate([[0], np.cumsum([len(s) for s in shapes])])
+    points = np.vstack(shapes)
+    area, _ = polygons.areas_and_centroids(points, start, np.arange(start[-1]))
+    total = polygons.signed_area(outline)
+    if abs(area.sum() - total) > 1e-6 * total or area.min() <= 0.0:
+        raise ValueError("outline: a part is thinner than a block, so a cell falls apart; use a smaller edge")
+    return points, start, np.arange(start[-1])
+
+
+def _conforming(points, start, corner, outline, check: bool = True) -> Tessellation:
+    """Give equal points one number, and drop repeated corners."""
+    tolerance = 1e-7 * float(np.ptp(outline, axis=0).max())
+    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    n = len(points)
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    _, label = connected_components(graph, directed=False)
+    _, first, number = np.unique(label, return_index=True, return_inverse=True)
+    rings = [_without_repeats(number[corner[a:b]].tolist()) for a, b in zip(start[:-1], start[1:])]
+    if check and min(len(r) for r in rings) < 3:
+        raise ValueError("tessellation: a block has fewer than three corners")
+    return _from_rings(points[first], rings, outline)
+
+
+def _without_repeats(ring: list[int]) -> list[int]:
+    return [p for k, p in enumerate(ring) if p != ring[k - 1]]
+
+
+def _from_rings(points: np.ndarray, rings: list[list[int]], outline: np.ndarray) -> Tessellation:
+    used = np.unique(np.concatenate([np.array(r) for r in rings]))
+    renumber = np.full(len(points), -1)
+    renumber[used] = np.arange(len(used))
+    start = np.concatenate([[0], np.cumsum([len(r) for r in rings])]).astype(np.int64)
+    corner = renumber[np.concatenate([np.array(r) for r in rings])].astype(np.int64)
+    return Tessellation(np.ascontiguousarray(points[used]), start, corner, outline)
+
+
+def collapse_short_edges(tessellation: Tessellation, shortest: float) -> Tessellation:
+    """Collapse edges below `shortest` [m], the shortest first, wherever all blocks around stay sound.
+
+    The ends of an inner edge meet in its middle; an end on the outline stays on it, a corner of the outline
+    stays put. An edge stays if a block around it would lose its third corner, or get a corner that turns inwards or
+    is a needle, or if its ends lie on different sides.
+    """
+    points = tessellation.points.copy()
+    outline = tessellation.outline
+    start, corner = tessellation.start, tessellation.corner
+    rings = [corner[a:b].tolist() for a, b in zip(start[:-1], start[1:])]
+    tolerance = 1e-6 * float(np.ptp(outline, axis=0).max())
+    on_side = polygons.distance_to_sides(points, outline) < tolerance
+    sides = [frozenset(np.flatnonzero(row).tolist()) for row in on_side]
+    blocks_at: list[set[int]] = [set() for _ in points]
+    for b, ring in enumerate(rings):
+        for p in ring:
+            blocks_at[p].add(b)
+    alive = [True] * len(points)
+    heap: list[tuple[float, int, int]] = []
+
+    def push(i: int, j: int) -> None:
+        length = float(np.hypot(*(points[i] - points[j])))
+        if length < shortest:
+            heapq.heappush(heap, (length, min(i, j), max(i, j)))
+
+    for ring in rings:
+        for k, p in enumerate(ring):
+            push(ring[k - 1], p)
+    while heap:
+        length, i, j = heapq.heappop(heap)
+        stale = not (alive[i] and alive[j]) or abs(np.hypot(*(points[i] - points[j])) - length) > 1e-12
+        if stale or not _joined(rings, blocks_at, i, j):
+            continue
+        if sides[i] == sides[j] and len(sides[i]) < 2:
+            target = 0.5 * (points[i] + points[j])
+        elif sides[i] > sides[j]:
+            target = points[i]
+        elif sides[i] < sides[j]:
+            target = points[j]
+        else:
+            continue
+        around = sorted(blocks_at[i] | blocks_at[j])
+        before = points[i].copy(), points[j].copy()
+        changed = {b: _without_repeats([i if p == j else p for p in rings[b]]) for b in around}
+        points[i] = points[j] = target
+        if not all(_sound(points, ring, sides) for ring in changed.values()):
+            points[i], points[j] = before
+            continue
+        alive[j] = False
+        for b, ring in changed.items():
+            rings[b] = ring
+        blocks_at[i] |= blocks_at[j]
+        sides[i] = sides[i] | sides[j]
+        for ring in changed.values():
+            k = ring.index(i)
+            push(i, ring[k - 1])
+            push(i, ring[(k + 1) % len(ring)])
+    return _from_rings(points, rings, outline)
+
+
+def _joined(rings, blocks_at, i: int, j: int) -> bool:
+    for b in blocks_at[i] & blocks_at[j]:
+        ring = rings[b]
+        k = ring.index(i)
+        if ring[k - 1] == j or ring[(k + 1) % len(ring)] == j:
+            return True
+    return False
+
+
+def _sound(points: np.ndarray, ring: list[int], sides) -> bool:
+    """At least three corners, none turned inwards (corners of the outline aside), none a needle."""
+    if len(ring) < 3 or len(set(ring)) < len(ring):
+        return False
+    xy = points[ring]
+    before = xy - np.roll(xy, 1, axis=0)
+    after = np.roll(before, -1, axis=0)
+    length = np.hypot(before[:, 0], before[:, 1]) * np.hypot(after[:, 0], after[:, 1])
+    sine = (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) / length
+    cosine = (before * after).sum(axis=1) / length
+    for k, p in enumerate(ring):
+        if len(sides[p]) >= 2:
+            continue
+        if sine[k] < -_REFLEX_SINE or (cosine[k] < 0.0 and sine[k] < _NEEDLE_SINE):
+            return False
+    return polygons.signed_area(xy) > 0.0
