@@ -1,0 +1,255 @@
+"""A bed of grains: insert, settle, shake, press, quench, count what touches the floor (H 8.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from graben.mechanics.failure import NumericsFailed
+from graben.mechanics.particles.assembly import Assembly, Survey
+from graben.mechanics.particles.insertion import insert
+from graben.mechanics.particles.law import LinearLaw
+from graben.mechanics.particles import motion
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# solid fraction by which a nominal depth is turned into a number of grains
+NOMINAL_FRACTION = 0.6
+HISTORY = (
+    "time", "kinetic", "elastic", "potential", "dashpots", "friction", "drag", "floor_work", "piston_work", "total",
+    "unbalanced", "floor_push", "piston_push", "piston_height", "floor_contacts",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class BedRecipe:
+    """What is poured, and what is done to it.
+
+    share : (c,) volume share of each class, theta_i of H (8.9); sums to 1
+    width : (2,) m; depth : m, of the bed before pressing (nominal: solid fraction 0.6)
+    loose_fraction : solid fraction of the inserted column
+    gravity : m/s2; pressure : Pa on top
+    shakes : cycles of the floor, z = amplitude sin(2 pi frequency t), amplitude m, frequency Hz
+    balance : unbalanced force ratio at which the bed counts as quiet; energy_limit : allowed relative error of
+        the energy balance
+    """
+
+    share: Floats
+    width: tuple[float, float]
+    depth: float
+    pressure: float
+    gravity: float = 9.81
+    periodic: bool = True
+    loose_fraction: float = 0.25
+    shakes: int = 0
+    shake_amplitude: float = 0.0
+    shake_frequency: float = 0.0
+    safety: float = 0.4
+    balance: float = 1e-3
+    energy_limit: float = 0.05
+    max_steps: int = 2_000_000
+
+
+@dataclass
+class Bed:
+    """A pressed and quenched bed. Arrays run over particles in the order of insertion.
+
+    history holds one row per sample (columns HISTORY); states the positions (n, 3) at the end of each phase.
+    """
+
+    radius: Floats
+    kind: Ints
+    position: Floats
+    velocity: Floats
+    floor_force: Floats
+    coordination: Ints
+    pair: Ints
+    normal: Floats
+    push: Floats
+    survey: Survey
+    history: Floats
+    states: dict[str, Floats] = field(default_factory=dict)
+    state_times: dict[str, float] = field(default_factory=dict)
+    area: float = 0.0
+    piston_height: float = 0.0
+    solid_fraction: float = 0.0
+    energy_error: float = 0.0
+    steps: int = 0
+    rebuilds: int = 0
+    time_step: float = 0.0
+    step_over_critical: float = 0.0
+
+    def floor_count(self, classes: int) -> Ints:
+        """Particles of each class (c,) that push on the floor."""
+        return np.bincount(self.kind[self.floor_force > 0.0], minlength=classes).astype(np.int64)
+
+
+def numbers(law: LinearLaw, recipe: BedRecipe) -> Ints:
+    """Particles of each class (c,) for the nominal depth. Raises ValueError for an empty bed."""
+    share = np.asarray(recipe.share, dtype=np.float64)
+    if share.shape != law.radius.shape or np.any(share < 0.0) or abs(share.sum() - 1.0) > 1e-6:
+        raise ValueError(f"share: expected {law.radius.size} shares >= 0 with sum 1, found {share.tolist()}")
+    solid = NOMINAL_FRACTION * recipe.width[0] * recipe.width[1] * recipe.depth
+    count = np.rint(share * solid / (4.0 / 3.0 * np.pi * law.radius**3)).astype(np.int64)
+    if count.sum() == 0 or np.any((count == 0) & (share > 0.0)):
+        raise ValueError(f"bed is empty: the box holds {count.tolist()} particles per class; make it larger")
+    return count
+
+
+class _Run:
+    """One bed under way: the assembly, its history and its checks."""
+
+    def __init__(self, law: LinearLaw, recipe: BedRecipe, seed: int, progress: Callable[[float, str], None]) -> None:
+        self.recipe, self.progress = recipe, progress
+        count = numbers(law, recipe)
+        order = np.argsort(-law.radius, kind="stable")
+        kind = np.repeat(order, count[order])
+        volume = float(np.sum(count * 4.0 / 3.0 * np.pi * law.radius**3))
+        area = recipe.width[0] * recipe.width[1]
+        height = max(volume / (recipe.loose_fraction * area), 4.0 * float(law.radius.max()))
+        rng = np.random.Generator(np.random.PCG64(seed))
+        position = insert(law.radius[kind], recipe.width, height, rng, periodic=recipe.periodic)
+        self.box = Assembly(
+            law, position, kind, recipe.width, periodic=recipe.periodic, gravity=recipe.gravity, safety=recipe.safety
+        )
+        self.insertion_kind = kind
+        self.area, self.volume = area, volume
+        self.mass = float(law.mass[kind].sum())
+        self.rows: list[list[float]] = []
+        self.states = {"inserted": position.copy()}
+        self.times = {"inserted": 0.0}
+        self.reference = self.box.energy()["total"]
+        self.energy_scale = abs(self.box.energy()["potential"])
+        self.energy_error = 0.0
+        self.over = 0.0
+
+    def sample(self) -> Survey:
+        box = self.box
+        energy = box.energy()
+        s, floor_force, _ = box.survey()
+        self.energy_scale = max(self.energy_scale, abs(energy["piston_work"]) + abs(energy["floor_work"]))
+        error = abs(energy["total"] - self.reference) / self.energy_scale
+        self.energy_error = max(self.energy_error, error)
+        self.over = max(self.over, s.step_over_critical)
+        if not error <= self.recipe.energy_limit:
+            raise NumericsFailed(
+                f"energy balance is off by {100.0 * error:.3g} % (limit {100.0 * self.recipe.energy_limit:.3g} %)",
+                step=box.steps, advice="lower numerics.safety (time step)",
+            )  # fmt: skip
+        if s.step_over_critical > 1.0:
+            raise NumericsFailed(
+                f"time step is {s.step_over_critical:.2f} of the stable one", step=box.steps,
+                advice="lower numerics.safety (time step)",
+            )  # fmt: skip
+        if s.overlap > 0.3:
+            raise NumericsFailed(
+                f"overlap of {100.0 * s.overlap:.3g} % of a radius", step=box.steps,
+                advice="raise the normal stiffness or lower the pressure",
+            )  # fmt: skip
+        known = {**energy, "time": box.time, "unbalanced": min(s.unbalanced, 1e30), "floor_push": s.floor_push,
+                 "piston_push": s.piston_push, "piston_height": box.place[motion.PISTON],
+                 "floor_contacts": float(np.count_nonzero(floor_force))}  # fmt: skip
+        self.rows.append([known[name] for name in HISTORY])
+        return s
+
+    def until(self, phase: str, quiet: Callable[[Survey], bool], fraction: float, chunk: int = 200) -> None:
+        """Run in chunks until `quiet`; two samples in a row must agree."""
+        calm = 0
+        while calm < 2:
+            self.box.advance(chunk)
+            s = self.sample()
+            calm = calm + 1 if quiet(s) else 0
+            self.progress(fraction, f"{phase}: unbalanced force {s.unbalanced:.2e}, kinetic {s.kinetic:.2e} J")
+            if self.box.steps > self.recipe.max_steps:
+                raise NumericsFailed(
+                    f"{phase} did not come to rest: unbalanced force {s.unbalanced:.2e}", step=self.box.steps,
+                    advice="raise numerics.max_steps or numerics.balance, or the contact damping",
+                )  # fmt: skip
+        self.states[phase] = self.box.by_identity(self.box.x)
+        self.times[phase] = self.box.time
+
+
+def make_bed(
+    law: LinearLaw,
+    recipe: BedRecipe,
+    seed: int,
+    progress: Callable[[float, str], None] = lambda fraction, message: None,
+) -> Bed:
+    """Pour, settle, shake (if asked), press and quench one bed.
+
+    Returns the bed at rest; raises ValueError for an impossible recipe and NumericsFailed when the run blows up,
+    loses energy balance, or does not come to rest within recipe.max_steps.
+    """
+    if not recipe.pressure > 0.0 or not recipe.gravity > 0.0:
+        raise ValueError(f"expected pressure > 0 and gravity > 0, found {recipe.pressure}, {recipe.gravity}")
+    run = _Run(law, recipe, seed, progress)
+    box = run.box
+    small = float(law.radius.min())
+    slow = 1e-4 * recipe.gravity * small  # kinetic energy per mass of a grain at rest
+    mean_k = float(np.mean(np.diag(law.pair_kn)))
+    weight = run.mass * recipe.gravity
+
+    def resting(s: Survey) -> bool:
+        return s.kinetic < slow * run.mass and abs(s.floor_push - weight) < 0.02 * weight
+
+    run.until("settled", resting, 0.1)
+    if recipe.shakes > 0:
+        if not (recipe.shake_amplitude > 0.0 and recipe.shake_frequency > 0.0):
+            raise ValueError("shaking: expected amplitude > 0 and frequency > 0")
+        box.shake_floor(recipe.shake_amplitude, recipe.shake_frequency)
+        steps = round(recipe.shakes / (recipe.shake_frequency * box.dt))
+        for done in range(0, steps, 500):
+            box.advance(min(500, steps - done))
+            run.sample()
+            progress(0.4 + 0.1 * done / steps, f"shaking: {done * box.dt * recipe.shake_frequency:.0f} cycles")
+        box.shake_floor(0.0, 0.0)
+        run.until("shaken", resting, 0.5)
+
+    # the plate: as heavy as a tenth of the bed, or, under high pressure, as light as keeps the bed's own pace
+    top = float(np.max(box.x[:, 2] + box.radius))
+    push = recipe.pressure * run.area
+    plate_mass = 0.1 * run.mass
+    bed_stiffness = mean_k * run.area / (2.0 * small) / top  # of a plate on a column of springs
+    damping = 2.0 * np.sqrt(bed_stiffness * plate_mass)
+    pace = np.pi * top * np.sqrt((run.mass / 3.0 + plate_mass) / bed_stiffness) / top  # slowest half period, s
+    box.set_piston(top, plate_mass, damping, push, push / (5.0 * pace))
+
+    def pressed(s: Survey) -> bool:
+        on = box.scalars[motion.PISTON_PUSH] >= push
+        return on and abs(s.piston_push - push) < 0.01 * push and s.unbalanced < 10.0 * recipe.balance
+
+    run.until("pressed", pressed, 0.7)
+    # quench: drag that damps the slowest mode critically, until forces balance
+    box.drive[motion.DRAG_RATE] = 2.0 * np.pi / (2.0 * pace)
+    run.until("quenched", lambda s: s.unbalanced < recipe.balance, 0.9)
+
+    s, floor_force, coordination = box.survey()
+    pair, normal, contact_push = box.contacts()
+    height = float(box.place[motion.PISTON])
+    return Bed(
+        radius=law.radius[run.insertion_kind],
+        kind=run.insertion_kind,
+        position=run.states["quenched"],
+        velocity=box.by_identity(box.v),
+        floor_force=box.by_identity(floor_force),
+        coordination=box.by_identity(coordination),
+        pair=pair,
+        normal=normal,
+        push=contact_push,
+        survey=s,
+        history=np.array(run.rows),
+        states=run.states,
+        state_times=run.times,
+        area=run.area,
+        piston_height=height,
+        solid_fraction=run.volume / (run.area * height),
+        energy_error=run.energy_error,
+        steps=box.steps,
+        rebuilds=box.rebuilds,
+        time_step=box.dt,
+        step_over_critical=run.over,
+    )
