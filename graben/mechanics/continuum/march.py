@@ -1,0 +1,163 @@
+"""Adaptive load steps through time, up to the end or up to the load that cannot be carried."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from graben.mechanics.continuum.body import Body, State
+from graben.mechanics.continuum.newton import NewtonOptions, Step, equilibrate
+
+
+@dataclass(frozen=True)
+class StepOptions:
+    """Length of the steps, s of load time.
+
+    first, largest, smallest : a step that fails is halved; below `smallest` the march ends
+    easy, hard : iterations below which the next step grows by half, and above which it shrinks by a third
+    extrapolate : start each step from the last increment, scaled
+    """
+
+    first: float
+    largest: float
+    smallest: float
+    easy: int = 6
+    hard: int = 12
+    extrapolate: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0 < self.smallest <= self.first <= self.largest:
+            raise ValueError("step lengths must satisfy 0 < smallest <= first <= largest")
+
+
+@dataclass
+class March:
+    """What a march went through.
+
+    Attributes
+    ----------
+    time, state, force : the last equilibrium
+    complete : whether the end time was reached
+    reason : why the last attempt failed (empty when complete)
+    iterations, residuals : per accepted step: factorisations and their residuals
+    rejected : number of attempts that failed
+    factorisations : of all attempts
+    external_work, internal_work, drag_work : J per metre
+    """
+
+    time: float
+    state: State
+    force: np.ndarray
+    complete: bool = False
+    reason: str = ""
+    iterations: list[int] = field(default_factory=list)
+    residuals: list[tuple[float, ...]] = field(default_factory=list)
+    rejected: int = 0
+    factorisations: int = 0
+    external_work: float = 0.0
+    internal_work: float = 0.0
+    drag_work: float = 0.0
+
+    def energy_error(self) -> float:
+        """Work of loads and supports against work of the stresses, relative; 0 before anything moved."""
+        work = max(abs(self.external_work), abs(self.internal_work))
+        return abs(self.external_work - self.internal_work - self.drag_work) / work if work > 0 else 0.0
+
+
+def march(
+    body: Body,
+    start: State,
+    external: Callable[[float], np.ndarray],
+    begin: float,
+    end: float,
+    steps: StepOptions,
+    newton: NewtonOptions,
+    *,
+    prescribed: Callable[[float], np.ndarray] | None = None,
+    save_times: np.ndarray | None = None,
+    drag: Callable[[float], np.ndarray] | None = None,
+    accepted: Callable[[float, State, np.ndarray, Step], None] | None = None,
+) -> March:
+    """Follow the load history from `begin` to `end`, s.
+
+    Parameters
+    ----------
+    external : nodal loads (2 n,), N/m, at a time
+    prescribed : displacement of `body.fixed`, m, at a time; None: stays as it is in `start`
+    save_times : times that a step must end on
+    drag : resistance (2 n,) per displacement increment for a step of the given length (viscous stabilisation)
+    accepted : called after each equilibrium with time, state, internal forces and the step
+
+    Returns
+    -------
+    March; not complete when a step of the smallest length failed: the load of `time` is then the last carried
+    """
+    held = start.displacement[body.fixed].copy()
+    supports = prescribed if prescribed is not None else (lambda _t: held)
+    stops = np.array([end]) if save_times is None else np.append(np.asarray(save_times, dtype=float), end)
+    stops = np.unique(stops[(stops > begin) & (stops <= end)])
+    # At rest the forces that balance the stresses are the internal ones: no work is missed at the start.
+    force = body.respond(start, np.zeros(body.pattern.size), False).force
+    run = March(begin, start, force)
+    load = external(begin)
+    length, last_length = steps.first, 0.0
+    last_increment: np.ndarray | None = None
+    while run.time < end:
+        stop = float(stops[np.searchsorted(stops, run.time, side="right")])
+        target = run.time + length
+        # A remainder shorter than a tenth of a step is taken along.
+        if target > stop - 0.1 * length:
+            target = stop
+        taken = target - run.time
+        guess = None
+        if steps.extrapolate and last_increment is not None:
+            guess = last_increment * (taken / last_length)
+        new_load = external(target)
+        resist = None if drag is None else drag(taken)
+        step = equilibrate(body, run.state, new_load, supports(target), newton, guess, resist)
+        run.factorisations += step.iterations
+        if not step.converged and guess is not None:
+            # The path may have bent: once more from rest before the step is halved.
+            step = equilibrate(body, run.state, new_load, supports(target), newton, None, resist)
+            run.factorisations += step.iterations
+        if not step.converged:
+            run.rejected += 1
+            run.reason = step.reason
+            length = 0.5 * taken
+            if length < steps.smallest:
+                return run
+            continue
+        increment = step.state.displacement - run.state.displacement
+        _book(run, body, step, increment, load, new_load, resist)
+        last_increment, last_length = increment, taken
+        run.time, run.state, run.force, load = target, step.state, step.force, new_load
+        run.iterations.append(step.iterations)
+        run.residuals.append(step.residuals)
+        if accepted is not None:
+            accepted(run.time, run.state, run.force, step)
+        if step.iterations <= steps.easy:
+            length = min(1.5 * max(length, taken), steps.largest)
+        elif step.iterations > steps.hard:
+            length = max(taken * 2 / 3, steps.smallest)
+    run.complete, run.reason = True, ""
+    return run
+
+
+def _book(
+    run: March,
+    body: Body,
+    step: Step,
+    increment: np.ndarray,
+    load: np.ndarray,
+    new_load: np.ndarray,
+    resist: np.ndarray | None,
+) -> None:
+    """Add a step to the energy ledger: loads on free, supports on fixed degrees of freedom."""
+    mean = 0.5 * (load + new_load)
+    mean[body.fixed] = 0.5 * (run.force + step.force)[body.fixed]
+    run.external_work += float(mean @ increment)
+    run.internal_work += body.internal_work(run.state, step.state)
+    if resist is not None:
+        run.drag_work += 0.5 * float((resist * increment) @ increment)
