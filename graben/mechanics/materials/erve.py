@@ -32,6 +32,7 @@ from graben.mechanics.compiled import kernel
 from graben.mechanics.materials.elastic import POISSON, YOUNG, finite
 from graben.mechanics.materials.j2 import HARDENING, fill_tangent, hardening_faults, return_to_table
 from graben.mechanics.materials.law import NOT_FINITE, OK, Law, Parameter
+from graben.mechanics.materials.principal import back_space_stress, split_space
 
 MAX_STEP = 4
 TABLE = 6
@@ -67,25 +68,11 @@ def grow(damage, n, energy, threshold, step):
 
 
 @kernel(error_model="numpy")
-def positive_part(stress, n, out):
-    """Positive principal part of a stress (n,) into out (6,). Eigenvectors by numpy; shear order xy, yz, zx."""
-    full = np.zeros((3, 3))
-    full[0, 0], full[1, 1], full[2, 2] = stress[0], stress[1], stress[2]
-    full[0, 1] = full[1, 0] = stress[3]
-    if n == 6:
-        full[1, 2] = full[2, 1] = stress[4]
-        full[0, 2] = full[2, 0] = stress[5]
-    values, vectors = np.linalg.eigh(full)
-    out[:] = 0.0
-    for k in range(3):
-        w = max(values[k], 0.0)
-        a, b, c = vectors[0, k], vectors[1, k], vectors[2, k]
-        out[0] += w * a * a
-        out[1] += w * b * b
-        out[2] += w * c * c
-        out[3] += w * a * b
-        out[4] += w * b * c
-        out[5] += w * a * c
+def positive_part(stress, out):
+    """Positive principal part of a stress (6,) into out (6,)."""
+    vectors = np.empty((3, 3))
+    s1, s2, s3 = split_space(stress, vectors)
+    back_space_stress(max(s1, 0.0), max(s2, 0.0), max(s3, 0.0), vectors, out)
 
 
 @kernel(error_model="numpy")
@@ -140,7 +127,7 @@ def update_erve(deps, sig, state, par, length, tangent):
 
     positive = np.zeros(6)
     if split == 2:
-        positive_part(eff, n, positive)
+        positive_part(eff, positive)
         energy = elastic_energy(positive, young, nu)
     else:
         energy = elastic_energy(eff, young, nu)
