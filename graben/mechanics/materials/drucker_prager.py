@@ -1,17 +1,19 @@
 """Extended Drucker-Prager plasticity with ductile damage, Y 2.5.2.
 
-With p = -tr(s)/3, q the von Mises stress and r^3 = 27/2 det(dev s) of the effective stress s = sigma / (1 - D)
-(Y prints p and q swapped):
+With p = -tr(s)/3, q the von Mises stress and r^3 = 27/2 det(dev s) of the effective stress s = sigma / (1 -
+D) (Y prints p and q swapped):
 
     F = t - p tan(beta) - (1 - tan(beta)/3) sigma_c(e)        Y (2.29)
     t = q/2 (1 + 1/K - (1 - 1/K) (r/q)^3)
     G = t - p tan(psi)                                        Y (2.30)
 
-beta is the friction angle in the p-t plane and e the equivalent plastic strain, which equals the axial plastic strain
-in uniaxial compression: de = (1 - tan(psi)/3) dlambda. sigma_c(e) is a curve of `hardening.py`.
+beta is the friction angle in the p-t plane and e the equivalent plastic strain, which equals the axial
+plastic strain in uniaxial compression: de = (1 - tan(psi)/3) dlambda. sigma_c(e) is a curve of
+`hardening.py`.
 
-Damage starts when the sum of de / e_f(eta) reaches 1, with triaxiality eta = -p/q and e_f = D2 exp(D3 eta), Y (2.33)
-and (2.71)-(2.72); from there dD = L de / u_f, Y (2.34), with the element length L. D stops at max_damage.
+Damage starts when the sum of de / e_f(eta) reaches 1, with triaxiality eta = -p/q and e_f = D2 exp(D3 eta), Y
+(2.33) and (2.71)-(2.72); from there dD = L de / u_f, Y (2.34), with the element length L. D stops at
+max_damage.
 
 Return mapping: the law is isotropic, so only principal values change. In the deviatoric plane, with polar
 coordinates rho = sqrt(2/3) q and Lode angle th (cos 3 th = (r/q)^3), t = sqrt(3/2) rho h(th) with
@@ -20,22 +22,22 @@ h = 1 + k/2 (1 + cos 3 th), k = 1/K - 1, and backward Euler reads
     rho = rho_tr cos(th - th_tr) - a h,   0 = rho_tr sin(th - th_tr) + a h',   a = sqrt(6) mu dlambda.
 
 Two unknowns (dlambda, th); Newton first, nested bisection where that fails, which cannot for a convex surface
-(K >= 7/9). Where rho would become negative the stress returns to the apex; beyond the flow along G, the apex takes volumetric
-flow v whose equivalent plastic strain is (1 - tan(psi)/3) v / tan(beta), so that the two agree when psi = beta.
+(K >= 7/9). Where rho would become negative the stress returns to the apex; beyond the flow along G, the apex
+takes volumetric flow v whose equivalent plastic strain is (1 - tan(psi)/3) v / tan(beta), so that the two
+agree when psi = beta.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.elastic import POISSON, YOUNG, add_elastic, fill_elastic, finite, moduli
-from graben.mechanics.materials.hardening import BARCELONA, CHOICES, EXPONENTIAL, barcelona_coefficients, harden
-from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law, Parameter
+from graben.mechanics.materials.drucker_prager_parameters import PARAMETERS, check
+from graben.mechanics.materials.elastic import add_elastic, fill_elastic, finite, moduli
+from graben.mechanics.materials.hardening import BARCELONA, EXPONENTIAL, barcelona_coefficients, harden
+from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law
 from graben.mechanics.materials.principal import (
     back_plane_stress,
     back_plane_tangent,
@@ -46,7 +48,7 @@ from graben.mechanics.materials.principal import (
     split_space,
 )
 
-# slots of par, in the order of PARAMETERS below; then the derived values; then the table
+# slots of par, in the order of PARAMETERS; then the derived values; then the table
 _E, _NU, _BETA, _PSI, _K, _KIND, _SIGMA0, _GAIN, _RATE, _PEAK, _EPEAK, _SLOPE, _DAMAGE, _E50, _E60, _UF, _DMAX = (
     range(17)
 )
@@ -133,7 +135,7 @@ def _turned(rho, theta, a, k):
     low, high = theta, _SIXTH_TURN
     angle = theta
     for _iteration in range(100):
-        h, h1, h2 = _shape(angle, k)
+        _h, h1, h2 = _shape(angle, k)
         turn = rho * math.sin(angle - theta) + a * h1
         if turn > 0.0:
             high = angle
@@ -204,7 +206,8 @@ def _apex_flow(p, strain, bulk, par):
 
 @kernel(error_model="numpy")
 def _damage(state, gain, eta, length, par):
-    """Advance state[1] damage and state[2] initiation by an equivalent plastic strain `gain` at triaxiality eta.
+    """Advance state[1] damage and state[2] initiation by an equivalent plastic strain `gain` at triaxiality
+    eta.
 
     Returns d(damage)/d(gain) and d(damage)/d(eta).
     """
@@ -228,7 +231,8 @@ def _damage(state, gain, eta, length, par):
 
 @kernel(error_model="numpy")
 def _return(s1, s2, s3, bulk, shear, state, par, length, tangent):
-    """Effective trial principal values (sorted) -> code, s1, s2, s3 nominal, with tangent[:3, :3] and state set.
+    """Effective trial principal values (sorted) -> code, s1, s2, s3 nominal, with tangent[:3, :3] and state
+    set.
 
     Called only where the trial stress lies outside the yield surface.
     """
@@ -378,39 +382,6 @@ def _shears(e1, e2, e3, s1, s2, s3, scale, keep, shear, tangent):
     return g12, g13, g23
 
 
-def _check(values: Mapping[str, Any]) -> list[str]:
-    found = []
-    if values.get("hardening", "exponential") == "barcelona" and values["peak_yield"] < values["initial_yield"]:
-        found.append("peak_yield at least initial_yield")
-    if values.get("hardening") == "table" and np.any(np.asarray(values["hardening_table"])[:, 1] < 0.0):
-        found.append("hardening_table without negative stresses")
-    return found
-
-
-PARAMETERS = (
-    YOUNG,
-    Parameter("poisson_ratio", "1", -0.99, POISSON.upper, None, POISSON.description, POISSON.usual),
-    Parameter(
-        "friction_angle", "rad", 0.0, math.radians(71.0), None,
-        "slope of the yield surface in the p-t plane (not Mohr-Coulomb's angle)", "45 to 60 deg for jointed rock",
-    ),
-    Parameter("dilation_angle", "rad", 0.0, math.radians(71.0), 0.0, "slope of the flow potential in the p-t plane", "5 to 40 deg"),
-    Parameter("flow_stress_ratio", "1", 7.0 / 9.0, 1.0, 1.0, "K, strength in triaxial extension over compression; convex from 7/9", "0.78 to 1"),
-    Parameter("hardening", "1", default="exponential", choices=CHOICES, description="form of the hardening curve"),
-    Parameter("initial_yield", "Pa", 0.0, 1e16, 0.0, "uniaxial compressive yield stress at no plastic strain", "1 kPa to 10 MPa"),
-    Parameter("hardening_gain", "Pa", 0.0, 1e16, None, "Q: how far the yield stress rises in all", "0.5 to 10 MPa", when=("hardening", "exponential")),
-    Parameter("hardening_rate", "1", 0.0, 1e9, None, "b: rate of the rise per plastic strain", "10 to 1000", when=("hardening", "exponential")),
-    Parameter("peak_yield", "Pa", 0.0, 1e16, None, "yield stress at the peak of the Barcelona curve", "0.5 to 5 MPa", when=("hardening", "barcelona")),
-    Parameter("strain_at_peak", "1", 1e-9, 1e3, None, "plastic strain at that peak", "0.5 to 5 %", when=("hardening", "barcelona")),
-    Parameter("hardening_modulus", "Pa", -1e16, 1e16, 0.0, "slope of the linear hardening curve", when=("hardening", "linear")),
-    Parameter("damage", "1", default="none", choices=("none", "ductile"), description="ductile damage off or on"),
-    Parameter("initiation_strain_050", "1", 1e-12, 1e6, None, "plastic strain at damage initiation, triaxiality -0.5", "0.01 to 5 %", when=("damage", "ductile")),
-    Parameter("initiation_strain_060", "1", 1e-12, 1e6, None, "plastic strain at damage initiation, triaxiality -0.6", "0.1 to 20 %", when=("damage", "ductile")),
-    Parameter("failure_displacement", "m", 1e-12, 1e9, None, "plastic displacement from initiation to D = 1", "0.01 to 5 m", when=("damage", "ductile")),
-    Parameter("max_damage", "1", 0.0, 0.999999, 0.99, "damage stops here, so that a stiffness remains", when=("damage", "ductile")),
-    Parameter("hardening_table", "1, Pa", default=None, table=True, description="rows (plastic strain, yield stress)", when=("hardening", "table")),
-)  # fmt: skip
-
 DRUCKER_PRAGER = Law(
     id=3,
     name="drucker-prager",
@@ -420,5 +391,5 @@ DRUCKER_PRAGER = Law(
     state_names=("equivalent_plastic_strain", "damage", "initiation"),
     initial_state=lambda par: np.zeros(3),
     prepare=prepare_drucker_prager,
-    check=_check,
+    check=check,
 )

@@ -1,9 +1,9 @@
 """One material point along a path of prescribed strains and stresses, in any mix.
 
 Each component is under strain control or stress control. An increment prescribes the change of the controlled
-quantity; the strains under stress control follow by Newton with the law's own tangent. An increment that does not converge
-is halved, down to a smallest one; where that fails too the path has no solution there (a damaged point cannot
-carry the prescribed stress): the driver stops, keeps what it reached and says how far it came.
+quantity; the strains under stress control follow by Newton with the law's own tangent. An increment that does
+not converge is halved, down to a smallest one; where that fails too the path has no solution there (a damaged
+point cannot carry the prescribed stress): the driver stops, keeps what it reached and says how far it came.
 """
 
 from __future__ import annotations
@@ -56,8 +56,9 @@ def increment(
 ):
     """One increment: change[i] is the strain change, or the new stress of a component under stress control.
 
-    free[:m] lists the components under stress control. tangent holds the one of the last increment (the predictor) and gets the
-    new one. sig, state, eps change in place on success; on failure they are as before and False is returned.
+    free[:m] lists the components under stress control. tangent holds the one of the last increment (the
+    predictor) and gets the new one. sig, state, eps change in place on success; on failure they are as before
+    and False is returned.
     """
     n = sig.shape[0]
     for i in range(n):
@@ -124,12 +125,13 @@ def increment(
 def drive(
     law_id, par, length, tolerance, parts, control, targets, sig, state, eps, stress_out, strain_out, state_out
 ):
-    """Follow one path from its present state; returns how many rows of targets were reached (a fraction counts).
+    """Follow one path from its present state; returns how many rows of targets were reached (a fraction
+    counts).
 
-    control (n,) is 1 under stress control, else 0. targets (rows, n): row 0 is where the path stands, each later row the strain
-    (engineering shear) or stress to reach. parts: increments per row. sig, eps (n,) and state (m,) are the present
-    values and change in place. Outputs (rows, ...) get row 0 as it stands; rows beyond the end hold the last state.
-    state_out may have 0 rows.
+    control (n,) is 1 under stress control, else 0. targets (rows, n): row 0 is where the path stands, each
+    later row the strain (engineering shear) or stress to reach. parts: increments per row. sig, eps (n,) and
+    state (m,) are the present values and change in place. Outputs (rows, ...) get row 0 as it stands; rows
+    beyond the end hold the last state. state_out may have 0 rows.
     """
     rows, n = targets.shape
     free = np.empty(n, np.int64)
@@ -199,8 +201,11 @@ def drive(
 
 
 @kernel(error_model="numpy")
-def drive_paths(law_id, par, length, tolerance, parts, control, targets, rows, sig, state, eps, stress, strain, states):
-    """`drive` for several paths: targets (paths, steps, n) of which rows[p] count; returns reached (paths,)."""
+def drive_paths(
+    law_id, par, length, tolerance, parts, control, targets, rows, sig, state, eps, stress, strain, states
+):
+    """`drive` for several paths: targets (paths, steps, n) of which rows[p] count; returns reached
+    (paths,)."""
     reached = np.empty(targets.shape[0])
     for p in range(targets.shape[0]):
         r = rows[p]
@@ -219,9 +224,9 @@ def drive_paths(law_id, par, length, tolerance, parts, control, targets, rows, s
 class Response:
     """What a point did along its paths.
 
-    stress (paths, steps, n) Pa, strain (paths, steps, n) with tensor shear, state (paths, steps, m); reached (paths,):
-    steps reached, the last one as a fraction; complete (paths,) whether the whole path has a solution. Steps
-    beyond `reached` repeat the last state.
+    stress (paths, steps, n) Pa, strain (paths, steps, n) with tensor shear, state (paths, steps, m); reached
+    (paths,): steps reached, the last one as a fraction; complete (paths,) whether the whole path has a
+    solution. Steps beyond `reached` repeat the last state.
     """
 
     stress: NDArray[np.float64]
@@ -249,7 +254,8 @@ def follow(
     ----------
     law, par : name of the law and its packed parameters (`laws.pack`)
     control : one word over components, "e" strain and "s" stress, such as "seee"; or one word per path
-    targets : (paths, steps, n) or (steps, n), n 4 or 6; strain (tensor shear) or stress in Pa to reach at each step;
+    targets : (paths, steps, n) or (steps, n), n 4 or 6; strain (tensor shear) or stress in Pa to reach at
+    each step;
         step 0 is where the path starts and nothing is done to get there
     length : characteristic length in m, for laws with damage
     stress : (paths, n) or (n,) stress at the start, default 0
