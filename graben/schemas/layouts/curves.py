@@ -22,7 +22,6 @@ LAYOUT = Layout(
         "path": "one REV of one simulation, or one laboratory or reference test",
         "step": "saved states of a path; shorter paths are padded with nan after step_count",
         "component": "xx, yy, zz, xy of a symmetric tensor (tensor shear strain)",
-        "plane": "x, y",
         "axis": "x, y, z",
     },
     variables={
