@@ -1,0 +1,193 @@
+"""A constitutive law and its parameters, as scenes and `NAME.material.toml` files give them.
+
+law = "drucker-prager"
+[parameters]
+young_modulus = "1.8 GPa"       # a quantity with its unit
+poisson_ratio = 0.2             # dimensionless: a bare number
+hardening = "exponential"       # a word
+# a table: [[0.0, "50 kPa"], [0.01, "2 MPa"]]
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import model_validator
+
+from graben.schemas.faults import BadInput, Fault
+from graben.schemas.files import whole_file
+from graben.schemas.quantities import key, to_si
+from graben.schemas.scene import InputFile, Model
+
+_ELASTIC = {"young_modulus": "Pa", "poisson_ratio": "1"}
+_DUCTILE = {
+    "damage": "word",
+    "initiation_strain_050": "1",
+    "initiation_strain_060": "1",
+    "failure_displacement": "m",
+    "max_damage": "1",
+}
+_HARDENING = {
+    "hardening": "word",
+    "initial_yield": "Pa",
+    "hardening_gain": "Pa",
+    "hardening_rate": "1",
+    "peak_yield": "Pa",
+    "strain_at_peak": "1",
+    "hardening_modulus": "Pa",
+    "hardening_table": "table",
+}
+
+UNITS: dict[str, dict[str, str]] = {
+    "elastic": {**_ELASTIC},
+    "j2": {**_ELASTIC, "hardening": "table"},
+    "drucker-prager": {
+        **_ELASTIC,
+        "friction_angle": "rad",
+        "dilation_angle": "rad",
+        "flow_stress_ratio": "1",
+        **_HARDENING,
+        **_DUCTILE,
+    },
+    "erve": {
+        **_ELASTIC,
+        "damage_threshold": "Pa",
+        "subdomains": "1",
+        "max_damage_step": "1",
+        "split": "word",
+        "hardening": "table",
+    },
+}
+"""law -> parameter -> SI unit, "word" or "table" (plastic strain, stress in Pa). A test holds it to the laws."""
+
+
+def parameter_to_si(law: str, name: str, value: Any) -> Any:
+    """One value as files give it -> a float in SI, a word, or rows of floats. ValueError says what was expected."""
+    unit = UNITS[law].get(name)
+    if unit is None:
+        raise ValueError(f"a parameter of {law}: {', '.join(UNITS[law])}")
+    if unit == "word":
+        if not isinstance(value, str):
+            raise ValueError("a word")
+        return value
+    if unit == "table":
+        if not isinstance(value, list | tuple) or not all(isinstance(r, list | tuple) and len(r) == 2 for r in value):
+            raise ValueError('rows of plastic strain and stress, such as [[0.0, "60 MPa"], [0.1, "90 MPa"]]')
+        return [[_number(x), to_si(y, "Pa")] for x, y in value]
+    if unit == "1":
+        return _number(value)
+    return to_si(value, unit)
+
+
+def _number(value: Any) -> float:
+    """A bare number, or a dimensionless quantity such as "5 %"."""
+    if isinstance(value, bool):
+        raise ValueError("a number")
+    if isinstance(value, int | float):
+        return float(value)
+    if isinstance(value, str) and value.strip().endswith("%"):
+        return to_si(value.strip()[:-1] + " * 0.01", "dimensionless")
+    raise ValueError("a bare number (dimensionless)")
+
+
+def _convert(law: Any, parameters: Any) -> tuple[dict[str, Any], list[tuple[str, Any, str]]]:
+    """Values in SI, and every fault as (key, value, expected)."""
+    if law not in UNITS:
+        return {}, [("law", law, "one of " + ", ".join(UNITS))]
+    if not isinstance(parameters, Mapping):
+        return {}, [("parameters", parameters, "a table of parameters")]
+    values: dict[str, Any] = {}
+    faults = []
+    for name, value in parameters.items():
+        try:
+            values[name] = parameter_to_si(law, name, value)
+        except ValueError as error:
+            faults.append((f"parameters.{name}", value, str(error)))
+    return values, faults
+
+
+class MaterialTable(Model):
+    """Either `file`, or `law` and `parameters`."""
+
+    file: InputFile | None = key(None, "a NAME.material.toml, or calibrate's artifact, instead of law and parameters")
+    law: str | None = key(None, "name of the law: " + ", ".join(UNITS))
+    parameters: dict[str, Any] = key({}, "the law's parameters: quantities with units, bare numbers, words, tables")
+
+    @model_validator(mode="after")
+    def _whole(self) -> Self:
+        if (self.file is None) == (self.law is None):
+            raise ValueError("either file, or law with parameters")
+        if self.law is not None:
+            faults = _convert(self.law, self.parameters)[1]
+            if faults:
+                raise ValueError("; ".join(f"{k} = {v!r}: expected {e}" for k, v, e in faults))
+        return self
+
+    def resolve(self) -> tuple[str, dict[str, Any]]:
+        """(law, values in SI), from the file where one is named. BadInput when that file has faults."""
+        if self.file is not None:
+            return read_material(self.file)
+        assert self.law is not None
+        return self.law, _convert(self.law, self.parameters)[0]
+
+
+def read_material(path: str | Path) -> tuple[str, dict[str, Any]]:
+    """Law and values in SI from a NAME.material.toml or from an artifact of kind "calibration".
+
+    Raises
+    ------
+    BadInput : every fault of the file at once
+    """
+    path = Path(path)
+    if path.suffix == ".nc":
+        from graben.schemas.artifact import read_artifact
+
+        text = str(read_artifact(path, "calibration").attrs["material"])
+    else:
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise BadInput(Fault(str(path), "", "", f"a readable material file ({error})")) from None
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise BadInput(Fault(str(path), "", "", f"valid TOML ({error})")) from None
+    extra = [
+        Fault(str(path), k, "", "no such key (law, parameters)") for k in tables if k not in ("law", "parameters")
+    ]
+    values, faults = _convert(tables.get("law"), tables.get("parameters", {}))
+    found = extra + [Fault(str(path), k, repr(v), e) for k, v, e in faults]
+    if found:
+        raise BadInput(found)
+    return str(tables["law"]), values
+
+
+_READABLE = {"Pa": (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3)), "rad": (("deg", 0.017453292519943295),), "m": ()}
+
+
+def material_text(law: str, values: Mapping[str, Any], note: str = "") -> str:
+    """A NAME.material.toml that reads back to the same bits; readable units follow as comments."""
+    lines = [f"# {line}" for line in note.splitlines()] + [f'law = "{law}"', "", "[parameters]"]
+    for name, value in values.items():
+        unit = UNITS[law][name]
+        if unit == "word":
+            lines.append(f'{name} = "{value}"')
+        elif unit == "table":
+            rows = ", ".join(f'[{float(x)!r}, "{float(y)!r} Pa"]' for x, y in value)
+            lines.append(f"{name} = [{rows}]")
+        elif unit == "1":
+            lines.append(f"{name} = {float(value)!r}")
+        else:
+            number = float(value)
+            human = next((f"  # {number / s:.4g} {u}" for u, s in _READABLE.get(unit, ()) if abs(number) >= s), "")
+            lines.append(f'{name} = "{number!r} {unit}"{human}')
+    return "\n".join(lines) + "\n"
+
+
+def write_material(path: str | Path, law: str, values: Mapping[str, Any], note: str = "") -> None:
+    """Write `material_text` as a whole file or not at all."""
+    with whole_file(path) as temporary:
+        temporary.write_text(material_text(law, values, note), encoding="utf-8")
