@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graben.mechanics.failure import NumericsFailed
+from graben.mechanics.particles import motion
 from graben.mechanics.particles.assembly import Assembly, Survey
 from graben.mechanics.particles.insertion import insert
 from graben.mechanics.particles.law import LinearLaw
-from graben.mechanics.particles import motion
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -51,6 +51,7 @@ class BedRecipe:
     safety: float = 0.4
     balance: float = 1e-3
     energy_limit: float = 0.05
+    ramp: float = 5.0  # half periods of the slowest mode over which the pressure rises
     max_steps: int = 2_000_000
 
 
@@ -216,7 +217,7 @@ def make_bed(
     bed_stiffness = mean_k * run.area / (2.0 * small) / top  # of a plate on a column of springs
     damping = 2.0 * np.sqrt(bed_stiffness * plate_mass)
     pace = np.pi * top * np.sqrt((run.mass / 3.0 + plate_mass) / bed_stiffness) / top  # slowest half period, s
-    box.set_piston(top, plate_mass, damping, push, push / (5.0 * pace))
+    box.set_piston(top, plate_mass, damping, push, push / (recipe.ramp * pace))
 
     def pressed(s: Survey) -> bool:
         on = box.scalars[motion.PISTON_PUSH] >= push

@@ -139,7 +139,25 @@ def rub(nx, ny, nz, px, py, pz, sx, sy, sz, kt, ct, limit, dt):
 
 @kernel
 def rough_forces(
-    x, v, spin, radius, kind, first, partner, dash, slip, kn, cn, kt, ct, friction, width, periodic, half_dt, force, torque
+    x,
+    v,
+    spin,
+    radius,
+    kind,
+    first,
+    partner,
+    dash,
+    slip,
+    kn,
+    cn,
+    kt,
+    ct,
+    friction,
+    width,
+    periodic,
+    half_dt,
+    force,
+    torque,
 ):
     """Add contact forces (n, 3) and torques (n, 3) with friction; slip (pairs, 3) holds the tangential springs.
 

@@ -49,8 +49,10 @@ class LinearLaw:
     wall_ct: Floats = field(init=False)
 
     def __post_init__(self) -> None:
-        arrays = {name: np.ascontiguousarray(getattr(self, name), dtype=np.float64)
-                  for name in ("radius", "density", "normal_stiffness")}
+        arrays = {
+            name: np.ascontiguousarray(getattr(self, name), dtype=np.float64)
+            for name in ("radius", "density", "normal_stiffness")
+        }
         shape = arrays["radius"].shape
         for name, a in arrays.items():
             if a.ndim != 1 or a.shape != shape or a.size == 0:
@@ -107,8 +109,10 @@ def critical_step(law: LinearLaw) -> float:
             touching = 0.81 * 2.0 / (1.0 - np.sqrt(1.0 - (s / (r + s)) ** 2))  # 12 for equal spheres
             k = touching / 3.0 * (law.pair_kn[i, j] + kt_weight * law.pair_kt[i, j])
             omega = np.sqrt(2.0 * k / law.mass[i])
-            beta = max(law.pair_cn[i, j] / law.pair_kn[i, j],
-                       law.pair_ct[i, j] / law.pair_kt[i, j] if law.rubs and law.shear_ratio > 0 else 0.0)
+            beta = max(
+                law.pair_cn[i, j] / law.pair_kn[i, j],
+                law.pair_ct[i, j] / law.pair_kt[i, j] if law.rubs and law.shear_ratio > 0 else 0.0,
+            )
             xi = 0.5 * omega * beta
             worst = min(worst, 2.0 / omega * (np.sqrt(1.0 + xi * xi) - xi))
         k = 2.0 * (law.wall_kn[i] + kt_weight * law.wall_kt[i])

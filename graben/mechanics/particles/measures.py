@@ -10,8 +10,30 @@ from graben.mechanics.particles.motion import FLOOR, PISTON
 
 @kernel
 def survey(
-    x, v, spin, radius, kind, mass, first, partner, slip, force, kn, kt, wall_kn, wall_kt, wall_slip, rubs, periodic,
-    width, place, gravity, piston_on, floor_force, coordination, stiffness
+    x,
+    v,
+    spin,
+    radius,
+    kind,
+    mass,
+    first,
+    partner,
+    slip,
+    force,
+    kn,
+    kt,
+    wall_kn,
+    wall_kt,
+    wall_slip,
+    rubs,
+    periodic,
+    width,
+    place,
+    gravity,
+    piston_on,
+    floor_force,
+    coordination,
+    stiffness,
 ):
     """Sums over all contacts of the present state, springs only.
 

@@ -15,16 +15,52 @@ FLOOR, PISTON, WALLS = 4, 5, 6
 # entries of the ledger, J; losses count positive, works are those done on the particles and the piston
 DASHPOTS, FRICTION, DRAG, FLOOR_WORK, PISTON_WORK, PISTON_DASHPOT, ENTRIES = 0, 1, 2, 3, 4, 5, 6
 # entries of the drive: the numbers that steer floor and piston
-(GRAVITY, DRAG_RATE, SHAKE_AMPLITUDE, SHAKE_OMEGA, SHAKE_START, PISTON_ON, PISTON_MASS, PISTON_DAMPING,
- PISTON_FORCE, PISTON_RATE, DRIVES) = range(11)
+(
+    GRAVITY,
+    DRAG_RATE,
+    SHAKE_AMPLITUDE,
+    SHAKE_OMEGA,
+    SHAKE_START,
+    PISTON_ON,
+    PISTON_MASS,
+    PISTON_DAMPING,
+    PISTON_FORCE,
+    PISTON_RATE,
+    DRIVES,
+) = range(11)
 # entries of the moving scalars
 TIME, PISTON_PUSH, SCALARS = 0, 1, 2
 
 
 @kernel
 def move(
-    x, v, spin, radius, kind, mass, wall_kn, wall_cn, wall_kt, wall_ct, wall_friction, rubs, periodic, dt, gravity,
-    drag, piston_on, place, speed_before, speed_after, wall_slip, start, force, torque, wall_force, damp_sum, ledger
+    x,
+    v,
+    spin,
+    radius,
+    kind,
+    mass,
+    wall_kn,
+    wall_cn,
+    wall_kt,
+    wall_ct,
+    wall_friction,
+    rubs,
+    periodic,
+    dt,
+    gravity,
+    drag,
+    piston_on,
+    place,
+    speed_before,
+    speed_after,
+    wall_slip,
+    start,
+    force,
+    torque,
+    wall_force,
+    damp_sum,
+    ledger,
 ):
     """Add wall and body forces, kick, drift; returns the largest squared distance from `start`, m2.
 
@@ -121,9 +157,42 @@ def move(
 
 @kernel
 def advance(
-    steps, dt, x, v, spin, radius, kind, first, partner, dash, slip, wall_slip, start, force, torque,
-    mass, kn, cn, kt, ct, friction, wall_kn, wall_cn, wall_kt, wall_ct, wall_friction,
-    rubs, periodic, width, drive, place, speed, scalars, skin, wall_force, ledger,
+    steps,
+    dt,
+    x,
+    v,
+    spin,
+    radius,
+    kind,
+    first,
+    partner,
+    dash,
+    slip,
+    wall_slip,
+    start,
+    force,
+    torque,
+    mass,
+    kn,
+    cn,
+    kt,
+    ct,
+    friction,
+    wall_kn,
+    wall_cn,
+    wall_kt,
+    wall_ct,
+    wall_friction,
+    rubs,
+    periodic,
+    width,
+    drive,
+    place,
+    speed,
+    scalars,
+    skin,
+    wall_force,
+    ledger,
 ):
     """Run up to `steps` steps; stop early when a particle has moved half a skin. Returns the steps done."""
     n = x.shape[0]
@@ -142,8 +211,25 @@ def advance(
                 for a in range(3):
                     torque[i, a] = 0.0
             lost, rubbed = rough_forces(
-                x, v, spin, radius, kind, first, partner, dash, slip, kn, cn, kt, ct, friction, width, periodic, half,
-                force, torque
+                x,
+                v,
+                spin,
+                radius,
+                kind,
+                first,
+                partner,
+                dash,
+                slip,
+                kn,
+                cn,
+                kt,
+                ct,
+                friction,
+                width,
+                periodic,
+                half,
+                force,
+                torque,
             )
             ledger[FRICTION] += rubbed
         else:
@@ -156,8 +242,33 @@ def advance(
             new_place = drive[SHAKE_AMPLITUDE] * np.sin(drive[SHAKE_OMEGA] * (time + dt - drive[SHAKE_START]))
             after[FLOOR] = (new_place - place[FLOOR]) / dt
         far = move(
-            x, v, spin, radius, kind, mass, wall_kn, wall_cn, wall_kt, wall_ct, wall_friction, rubs, periodic, dt,
-            gravity, drag, piston_on, place, speed, after, wall_slip, start, force, torque, wall_force, damp_sum, ledger
+            x,
+            v,
+            spin,
+            radius,
+            kind,
+            mass,
+            wall_kn,
+            wall_cn,
+            wall_kt,
+            wall_ct,
+            wall_friction,
+            rubs,
+            periodic,
+            dt,
+            gravity,
+            drag,
+            piston_on,
+            place,
+            speed,
+            after,
+            wall_slip,
+            start,
+            force,
+            torque,
+            wall_force,
+            damp_sum,
+            ledger,
         )
         if piston_on:
             push = min(drive[PISTON_FORCE], scalars[PISTON_PUSH] + drive[PISTON_RATE] * dt)
@@ -167,7 +278,9 @@ def advance(
             middle = 0.5 * (old + new)
             ledger[PISTON_WORK] -= push * middle * dt
             ledger[PISTON_DASHPOT] += drive[PISTON_DAMPING] * old * middle * dt
-            ledger[DASHPOTS] += damp_sum[PISTON] * 0.5 * (new - old) * dt  # `after` above did not know the new velocity
+            ledger[DASHPOTS] += (
+                damp_sum[PISTON] * 0.5 * (new - old) * dt
+            )  # `after` above did not know the new velocity
             after[PISTON] = new
         for w in range(6):
             speed[w] = after[w]
