@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from graben.mechanics.compiled import kernel
+from graben.mechanics.continuum.scratch.contact import sphere_contact
+from graben.mechanics.continuum.scratch.eight_points import forces_eight_points
 from graben.mechanics.continuum.scratch.geometry import shape_gradient, volume_gradient
 from graben.mechanics.continuum.scratch.mesh import Floats, HexMesh
 from graben.mechanics.continuum.scratch.motion import tip_position
-from graben.mechanics.continuum.scratch.one_point import EXTERNAL, LEDGER_SIZE
-from graben.mechanics.continuum.scratch.stepping import advance, refresh
+from graben.mechanics.continuum.scratch.one_point import EXTERNAL, KINETIC, LEDGER_SIZE, forces_one_point
+from graben.mechanics.continuum.scratch.stepping import kick_and_drift, kinetic_energy, refresh
 from graben.mechanics.continuum.scratch.surface import contact_stiffness, exposed_faces
 from graben.mechanics.failure import NumericsFailed
 
@@ -73,6 +75,7 @@ class Body:
         self.bulk, self.shear = elastic_moduli(par)
         self.x = mesh.points.copy()
         self.v = np.zeros_like(self.x)
+        self.step = np.zeros_like(self.x)
         self.force = np.zeros_like(self.x)
         self.tangent = np.zeros_like(self.x)
         self.alive = np.ones(count, dtype=np.int64)
@@ -90,7 +93,9 @@ class Body:
         self.clock = np.zeros(3)
         self.origin = np.array([tip.start, 0.0, tip.radius])
         self.tip = self.origin.copy()
+        self.next_tip, self.tip_step = np.zeros(3), np.zeros(3)
         self.contact_force, self.mean_force = np.zeros(3), np.zeros(3)
+        self.work_before = 0.0
         self.ledger = np.zeros(LEDGER_SIZE)
         self.damping = 0.0
         self.steps = self.updates = self.touching = 0
@@ -159,30 +164,68 @@ class Body:
         return n.refresh
 
     def advance(self, steps: int) -> None:
-        """Take steps; NumericsFailed names the element when one gives up."""
-        n = self.numerics
-        slot = -1 if self.removal is None else self.removal.step_slot
-        per_work = 0.0 if self.removal is None else 2.0 * self.removal.per_work
+        """Take steps of one length; NumericsFailed names the element when one gives up."""
         start = clock_module.perf_counter()
-        code, element, taken, self.touching = advance(
-            steps, self.clock, self.x, self.v, self.force, self.node_mass, self.mesh.free, self.mesh.cells, self.g0,
-            self.alive, self.vol, self.cell_mass, self.rot, self.sig, self.state, self.hour, self.law, self.par, slot,
-            per_work, self.shear, n.hourglass, n.viscosity, self.wave, self.damping, self.surface, self.stiffness, 1.0,
-            self.tangent, self.tip, self.origin, self.phases, self.sphere.radius, self.sphere.friction,
-            self.contact_force, self.mean_force, self.ledger,
-        )  # fmt: skip
+        living = int(self.alive.sum())
+        self.mean_force[:] = 0.0
+        for _ in range(steps):
+            code, element = self._step()
+            self.steps += 1
+            self.updates += living
+            if code != 0:
+                self._give_up(code, element)
+            self.mean_force += self.contact_force / steps
+        self.ledger[KINETIC] = kinetic_energy(
+            self.v, self.force, self.node_mass, self.mesh.free, 0.5 * float(self.clock[1])
+        )
         self.loop_seconds += clock_module.perf_counter() - start
-        self.steps += taken
-        self.updates += taken * int(self.alive.sum())
+
+    def _step(self) -> tuple[int, int]:
+        """One step; returns the failure code (0: none) and the element concerned."""
+        n, clock, ledger = self.numerics, self.clock, self.ledger
+        dt, span = float(clock[1]), 0.5 * float(clock[1] + clock[2])
+        kick_and_drift(
+            self.x, self.v, self.step, self.force, self.node_mass, self.mesh.free, dt, span, self.damping, ledger
+        )
+        clock[0] += dt
+        clock[2] = dt
+        tip_position(clock[0], self.phases, self.origin, self.next_tip)
+        self.tip_step[:] = self.next_tip - self.tip
+        self.tip[:] = self.next_tip
+        before = self.contact_force.copy()
+        if self.removal is not None:
+            work = 2.0 * (ledger[EXTERNAL] - self.work_before)
+            self.work_before = float(ledger[EXTERNAL])
+            self.par[self.removal.step_slot] = min(1.0, max(0.0, self.removal.per_work * work))
+        if n.points == 1:
+            code, element = forces_one_point(
+                self.x, self.step, self.mesh.cells, self.g0, self.alive, self.vol, self.cell_mass, self.rot, self.sig,
+                self.state, self.hour, self.law, self.par, self.shear, n.hourglass, n.viscosity, self.wave, dt,
+                self.force, ledger,
+            )  # fmt: skip
+        else:
+            code, element = forces_eight_points(
+                self.x, self.step, self.mesh.cells, self.g0, self.alive, self.vol, self.cell_mass, self.rot, self.sig,
+                self.state, self.law, self.par, n.viscosity, self.wave, dt, self.force, ledger,
+            )  # fmt: skip
         if code != 0:
-            what = "an element turned inside out" if code < 0 else f"the constitutive law gave up (code {code})"
-            centre = 1e6 * self.x[self.mesh.cells[element]].mean(axis=0)
-            raise NumericsFailed(
-                what,
-                where=f"element {element} near ({centre[0]:.1f}, {centre[1]:.1f}, {centre[2]:.1f}) um",
-                step=self.steps,
-                advice="lower numerics.safety or the speeds, or raise numerics.hourglass",
-            )
+            return code, element
+        self.touching = sphere_contact(
+            self.x, self.step, self.surface, self.stiffness, 1.0, self.tangent, self.tip, self.tip_step,
+            self.sphere.radius, self.sphere.friction, self.force, self.contact_force, ledger,
+        )  # fmt: skip
+        ledger[EXTERNAL] += 0.5 * float((before + self.contact_force) @ self.tip_step)
+        return 0, -1
+
+    def _give_up(self, code: int, element: int) -> None:
+        what = "an element turned inside out" if code < 0 else f"the constitutive law gave up (code {code})"
+        centre = 1e6 * self.x[self.mesh.cells[element]].mean(axis=0)
+        raise NumericsFailed(
+            what,
+            where=f"element {element} near ({centre[0]:.1f}, {centre[1]:.1f}, {centre[2]:.1f}) um",
+            step=self.steps,
+            advice="lower numerics.safety or the speeds, or raise numerics.hourglass",
+        )
 
     def snapshot(self, name: str) -> Snapshot:
         """Copy of the present state for pictures and sections."""
@@ -201,5 +244,6 @@ class Body:
             plastic_strain=self.state[:, :, p].mean(axis=1) if p >= 0 else zero,
             damage=self.state[:, :, d].mean(axis=1) if d >= 0 else zero,
             alive=self.alive.copy(),
+            volumes=self.vol.copy(),
             faces=self.faces.copy(),
         )

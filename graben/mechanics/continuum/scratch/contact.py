@@ -9,7 +9,9 @@ from graben.mechanics.continuum.scratch.one_point import NORMAL_STORED, TANGENT_
 
 
 @kernel(error_model="numpy")
-def sphere_contact(x, step, nodes, stiffness, shear_ratio, tangent, tip, tip_step, radius, friction, force, total, ledger):
+def sphere_contact(
+    x, step, nodes, stiffness, shear_ratio, tangent, tip, tip_step, radius, friction, force, total, ledger
+):
     """Add contact forces [N] to force (n, 3) at `nodes` (c,); total (3,) becomes the force on the specimen.
 
     stiffness (c,) N/m; the tangential spring is shear_ratio times it; tangent (n, 3) N is the tangential force on

@@ -6,21 +6,7 @@ import numpy as np
 
 from graben.mechanics.compiled import kernel
 
-# Node orders that map any corner of the hexahedron to corner 0 (the element's own symmetry group).
-ORDER = np.array(
-    [
-        [0, 1, 2, 3, 4, 5, 6, 7],
-        [1, 2, 3, 0, 5, 6, 7, 4],
-        [2, 3, 0, 1, 6, 7, 4, 5],
-        [3, 0, 1, 2, 7, 4, 5, 6],
-        [4, 7, 6, 5, 0, 3, 2, 1],
-        [5, 4, 7, 6, 1, 0, 3, 2],
-        [6, 5, 4, 7, 2, 1, 0, 3],
-        [7, 6, 5, 4, 3, 2, 1, 0],
-    ],
-    dtype=np.int64,
-)
-# Hourglass base vectors of the hexahedron: xi eta, eta zeta, zeta xi, xi eta zeta at the corners.
+# Hourglass base vectors of the hexahedron at its corners: xi eta, eta zeta, zeta xi, xi eta zeta.
 HOURGLASS = np.array(
     [
         [1, -1, 1, -1, 1, -1, 1, -1],
@@ -35,38 +21,61 @@ FACE_NODES = np.array(
 )
 
 
-@kernel
+@kernel(error_model="numpy")
+def _corner(y2, y3, y4, y5, y6, y8, z2, z3, z4, z5, z6, z8):
+    """Twelve times d volume / d x1 of a hexahedron; the names count corners from 1 (Flanagan and Belytschko)."""
+    return (
+        y2 * ((z6 - z3) - (z4 - z5))
+        + y3 * (z2 - z4)
+        + y4 * ((z3 - z8) - (z5 - z2))
+        + y5 * ((z8 - z6) - (z2 - z4))
+        + y6 * (z5 - z2)
+        + y8 * (z4 - z5)
+    )
+
+
+@kernel(error_model="numpy")
 def volume_gradient(xe, b):
     """Volume [m3] of a hexahedron with corners xe (8, 3), and b (8, 3) = d volume / d corner [m2].
 
     b / volume is the mean gradient of the shape functions, exact for any trilinear shape, so that a constant
     stress leaves no force at inner nodes (Flanagan and Belytschko 1981).
     """
-    for a in range(8):
-        o1, o2, o3 = ORDER[a, 1], ORDER[a, 2], ORDER[a, 3]
-        o4, o5, o7 = ORDER[a, 4], ORDER[a, 5], ORDER[a, 7]
-        for i in range(3):
-            j = i + 1 if i < 2 else 0
-            k = j + 1 if j < 2 else 0
-            y2, y3, y4 = xe[o1, j], xe[o2, j], xe[o3, j]
-            y5, y6, y8 = xe[o4, j], xe[o5, j], xe[o7, j]
-            z2, z3, z4 = xe[o1, k], xe[o2, k], xe[o3, k]
-            z5, z6, z8 = xe[o4, k], xe[o5, k], xe[o7, k]
-            b[a, i] = (
-                y2 * ((z6 - z3) - (z4 - z5))
-                + y3 * (z2 - z4)
-                + y4 * ((z3 - z8) - (z5 - z2))
-                + y5 * ((z8 - z6) - (z2 - z4))
-                + y6 * (z5 - z2)
-                + y8 * (z4 - z5)
-            ) / 12.0
+    c = 1.0 / 12.0
+    for i in range(3):
+        j = i + 1 if i < 2 else 0
+        k = j + 1 if j < 2 else 0
+        y1, y2, y3, y4 = xe[0, j], xe[1, j], xe[2, j], xe[3, j]
+        y5, y6, y7, y8 = xe[4, j], xe[5, j], xe[6, j], xe[7, j]
+        z1, z2, z3, z4 = xe[0, k], xe[1, k], xe[2, k], xe[3, k]
+        z5, z6, z7, z8 = xe[4, k], xe[5, k], xe[6, k], xe[7, k]
+        # the symmetry of the hexahedron turns any corner into the first
+        b[0, i] = c * _corner(y2, y3, y4, y5, y6, y8, z2, z3, z4, z5, z6, z8)
+        b[1, i] = c * _corner(y3, y4, y1, y6, y7, y5, z3, z4, z1, z6, z7, z5)
+        b[2, i] = c * _corner(y4, y1, y2, y7, y8, y6, z4, z1, z2, z7, z8, z6)
+        b[3, i] = c * _corner(y1, y2, y3, y8, y5, y7, z1, z2, z3, z8, z5, z7)
+        b[4, i] = c * _corner(y8, y7, y6, y1, y4, y2, z8, z7, z6, z1, z4, z2)
+        b[5, i] = c * _corner(y5, y8, y7, y2, y1, y3, z5, z8, z7, z2, z1, z3)
+        b[6, i] = c * _corner(y6, y5, y8, y3, y2, y4, z6, z5, z8, z3, z2, z4)
+        b[7, i] = c * _corner(y7, y6, y5, y4, y3, y1, z7, z6, z5, z4, z3, z1)
     volume = 0.0
     for a in range(8):
         volume += b[a, 0] * xe[a, 0]
     return volume
 
 
-@kernel
+@kernel(error_model="numpy")
+def hourglass_shares(w, out):
+    """Projections out (4, 3) of corner values w (8, 3) on the hourglass base vectors."""
+    for i in range(3):
+        d0, d1, d2, d3 = w[0, i] - w[1, i], w[2, i] - w[3, i], w[4, i] - w[5, i], w[6, i] - w[7, i]
+        out[0, i] = d0 + d1 + d2 + d3
+        out[1, i] = (w[0, i] + w[1, i]) - (w[2, i] + w[3, i]) - (w[4, i] + w[5, i]) + (w[6, i] + w[7, i])
+        out[2, i] = d0 - d1 - d2 + d3
+        out[3, i] = d2 + d3 - d0 - d1
+
+
+@kernel(error_model="numpy")
 def largest_face(xe):
     """Area [m2] of the largest face of a hexahedron xe (8, 3), from the diagonals of each face."""
     largest = 0.0
@@ -79,7 +88,7 @@ def largest_face(xe):
     return largest
 
 
-@kernel
+@kernel(error_model="numpy")
 def shape_gradient(xe, xi, eta, zeta, g):
     """Jacobian determinant at a point of the parent cube, and g (8, 3) = d shape function / d position [1/m]."""
     jac = np.zeros((3, 3))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from graben.mechanics.compiled import kernel
-from graben.mechanics.continuum.scratch.geometry import HOURGLASS, volume_gradient
+from graben.mechanics.continuum.scratch.geometry import hourglass_shares, volume_gradient
 from graben.mechanics.continuum.scratch.rotation import follow_rotation, midstep_increment, rotate_stress
 from graben.mechanics.materials.laws import update
 
@@ -21,7 +21,26 @@ DAMPING, ADDED_MASS, LEDGER_SIZE = 8, 9, 10
 
 @kernel(error_model="numpy")
 def forces_one_point(
-    x, step, cells, g0, alive, vol, mass, rot, sig, state, hour, law, par, shear, chi, viscous, wave, dt, force, ledger
+    x,
+    step,
+    cells,
+    g0,
+    alive,
+    vol,
+    mass,
+    rot,
+    sig,
+    state,
+    hour,
+    law,
+    par,
+    shear,
+    chi,
+    viscous,
+    wave,
+    dt,
+    force,
+    ledger,
 ):
     """Subtract internal forces [N] from force (n, 3) after the displacement step (n, 3) that led to x (n, 3).
 
@@ -77,14 +96,9 @@ def forces_one_point(
         stiffness = chi * shear * square / (24.0 * volume)
         if state.shape[2] > 1:
             stiffness *= 1.0 - state[e, 0, 1]
+        hourglass_shares(xe, hx)
+        hourglass_shares(ue, dq)
         for p in range(4):
-            for i in range(3):
-                position, motion = 0.0, 0.0
-                for n in range(8):
-                    position += HOURGLASS[p, n] * xe[n, i]
-                    motion += HOURGLASS[p, n] * ue[n, i]
-                hx[p, i] = position
-                dq[p, i] = motion
             for i in range(3):
                 dq[p, i] -= a[i, 0] * hx[p, 0] + a[i, 1] * hx[p, 1] + a[i, 2] * hx[p, 2]
             for i in range(3):
@@ -99,18 +113,17 @@ def forces_one_point(
                 turned = q[0, i] * hx[0, j] + q[1, i] * hx[1, j] + q[2, i] * hx[2, j] + q[3, i] * hx[3, j]
                 s3[i, j] -= turned / volume
             s3[i, i] += pressure
+        for i in range(3):
+            # sums of the four hourglass forces with the signs of each corner
+            q0, q1, q2, q3 = q[0, i], q[1, i], q[2, i], q[3, i]
+            ue[0, i], ue[6, i] = q0 + q1 + q2 - q3, q0 + q1 + q2 + q3
+            ue[1, i], ue[7, i] = q1 - q0 - q2 + q3, q1 - q0 - q2 - q3
+            ue[2, i], ue[4, i] = q0 - q1 - q2 - q3, q0 - q1 - q2 + q3
+            ue[3, i], ue[5, i] = q2 - q0 - q1 + q3, q2 - q0 - q1 - q3
         for n in range(8):
             node = cells[e, n]
             for i in range(3):
-                force[node, i] -= (
-                    s3[i, 0] * b[n, 0]
-                    + s3[i, 1] * b[n, 1]
-                    + s3[i, 2] * b[n, 2]
-                    + q[0, i] * HOURGLASS[0, n]
-                    + q[1, i] * HOURGLASS[1, n]
-                    + q[2, i] * HOURGLASS[2, n]
-                    + q[3, i] * HOURGLASS[3, n]
-                )
+                force[node, i] -= s3[i, 0] * b[n, 0] + s3[i, 1] * b[n, 1] + s3[i, 2] * b[n, 2] + ue[n, i]
     ledger[INTERNAL] += internal
     ledger[HOURGLASS_WORK] += hourglass
     ledger[VISCOUS] += dissipated

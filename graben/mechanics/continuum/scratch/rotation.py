@@ -11,7 +11,7 @@ from __future__ import annotations
 from graben.mechanics.compiled import kernel
 
 
-@kernel
+@kernel(error_model="numpy")
 def inverse3(m, out):
     """Inverse of m (3, 3) into out; returns the determinant."""
     c0 = m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1]
@@ -28,7 +28,7 @@ def inverse3(m, out):
     return det
 
 
-@kernel
+@kernel(error_model="numpy")
 def follow_rotation(f, r, m, k):
     """Bring the rotation r (3, 3) up to the deformation gradient f (3, 3), in place; m, k (3, 3) are scratch.
 
@@ -64,7 +64,7 @@ def follow_rotation(f, r, m, k):
             r[i, j] = b0 * m[0, j] + b1 * m[1, j] + b2 * m[2, j]
 
 
-@kernel
+@kernel(error_model="numpy")
 def midstep_increment(a, r, deps, m, k):
     """Strain increment deps (6,) (engineering shears, frame of r) from a (3, 3) = d(step)/d(end position).
 
@@ -93,7 +93,7 @@ def midstep_increment(a, r, deps, m, k):
     deps[5] = 2.0 * (r[0, 2] * k[0, 0] + r[1, 2] * k[1, 0] + r[2, 2] * k[2, 0])
 
 
-@kernel
+@kernel(error_model="numpy")
 def rotate_stress(s, r, out, k):
     """Stress s (6,) of the frame r as a full tensor out (3, 3) in space: R s R^T."""
     for i in range(3):

@@ -55,14 +55,14 @@ class Numerics:
     points: int = 1
     indent_speed: float = 0.003
     slide_speed: float = 0.02
-    lift_speed: float = 0.003
+    lift_speed: float = 0.006
     lift_share: float = 0.35
     rest_steps: int = 400
     safety: float = 0.8
     floor: float = 0.3
     mass_cap: float = 0.05
     refresh: int = 25
-    hourglass: float = 0.1
+    hourglass: float = 0.02
     viscosity: float = 0.06
     penalty: float = 0.5
     volume_limit: float = 0.02
@@ -81,7 +81,8 @@ class Damage:
 
 @dataclass
 class Snapshot:
-    """State of the body at one time: positions (n, 3), stress (e, 6) in space, p (e,), damage (e,), living (e,)."""
+    """State of the body at one time: positions (n, 3), stress (e, 6) in space, p (e,), damage (e,), living (e,),
+    volumes (e,) [m3], exposed faces (f, 4)."""
 
     name: str
     time: float
@@ -91,6 +92,7 @@ class Snapshot:
     plastic_strain: Floats
     damage: Floats
     alive: Ints
+    volumes: Floats
     faces: Ints
 
 
@@ -113,7 +115,7 @@ class ScratchRun:
     loaded: Snapshot
     unloaded: Snapshot
     frames: list[Snapshot]
-    volumes: tuple[Floats, Floats]
+    first_volumes: Floats
     cost: dict[str, float] = field(default_factory=dict)
 
 
@@ -214,7 +216,7 @@ def simulate(
         loaded=loaded,
         unloaded=unloaded,
         frames=kept + [unloaded],
-        volumes=(body.first_volumes, body.vol.copy()),
+        first_volumes=body.first_volumes,
         cost=cost,
     )
 
