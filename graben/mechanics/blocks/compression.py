@@ -83,7 +83,7 @@ def compress(
     b, s = model.bodies, model.skeleton
     sides = rectangle_sides(b.outline)
     top = b.vertex_side[:, sides.top]
-    s.steady[top, 1] = model.true_mass[top] * 0.0
+    s.steady[top, 1] = model.weight[top, 1]
     model.hold(top, 1, speed)
     d = model.motion.drive
     d[rx.SPEED], d[rx.SPEED_STEP] = 0.0, 1.0 / max(1.0, ramp_share * steps)

@@ -55,25 +55,31 @@ class Pairs(NamedTuple):
     intact: np.ndarray
 
 
+# Columns of the node table: position, velocity, and of the edge that starts there unit tangent and length. One cache
+# line a node, since the contact kernel reads nodes in no order.
+X, Y, VX, VY, TX, TY, LENGTH, COLUMNS = 0, 1, 2, 3, 4, 5, 6, 8
+
+
 @kernel
-def node_motion(x, v, first, second, weight, follow, xn, vn, tangent):
-    """Positions, velocities of the contact nodes and (unit tangent, length) of the edges that start there."""
+def node_motion(x, v, first, second, weight, follow, node):
+    """Fill the node table (nodes, 8) from vertex positions x and velocities v (vertices, 2)."""
     for i in range(first.shape[0]):
         a = first[i]
         b = second[i]
         w = weight[i]
-        for d in range(2):
-            xn[i, d] = x[a, d] + w * (x[b, d] - x[a, d])
-            vn[i, d] = v[a, d] + w * (v[b, d] - v[a, d])
+        node[i, X] = x[a, 0] + w * (x[b, 0] - x[a, 0])
+        node[i, Y] = x[a, 1] + w * (x[b, 1] - x[a, 1])
+        node[i, VX] = v[a, 0] + w * (v[b, 0] - v[a, 0])
+        node[i, VY] = v[a, 1] + w * (v[b, 1] - v[a, 1])
     for i in range(first.shape[0]):
         j = follow[i]
-        dx = xn[j, 0] - xn[i, 0]
-        dy = xn[j, 1] - xn[i, 1]
+        dx = node[j, X] - node[i, X]
+        dy = node[j, Y] - node[i, Y]
         length = np.sqrt(dx * dx + dy * dy)
         inverse = 1.0 / length
-        tangent[i, 0] = dx * inverse
-        tangent[i, 1] = dy * inverse
-        tangent[i, 2] = length
+        node[i, TX] = dx * inverse
+        node[i, TY] = dy * inverse
+        node[i, LENGTH] = length
 
 
 @kernel
@@ -89,65 +95,90 @@ def scatter_nodes(fn, first, second, weight, force):
 
 
 @kernel
-def contact_forces(active, pairs, follow, xn, vn, tangent, joint, deepest, dt, fn, sums):
+def _forget(pairs, c):
+    """An open contact remembers no stress; what slid stays, and so does the mark of a broken joint."""
+    for k in range(2):
+        pairs.shear[c, k] = 0.0
+        if pairs.flag[c, k] != BROKEN:
+            if pairs.intact[c] == 1 and pairs.flag[c, k] != OPEN:
+                pairs.flag[c, k] = BROKEN
+            else:
+                pairs.flag[c, k] = OPEN
+
+
+@kernel
+def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
     """Stress update and forces of the active candidates; returns the pair that overlaps too much, or -1.
 
-    active : (m,) indices into pairs; fn : (nodes, 2) forces, added to [N/m]
+    active : (m,) indices into pairs; node : node table; fn : (nodes, 2) forces, added to [N/m]
     deepest : overlap above which a touching pair stops the run, and others are no contact [m]
-    sums : [friction work, stored joint energy, largest overlap], the last two reset here
+    sums : [friction work, largest overlap]; the work that dilation gives back is not friction
     """
     kn = joint.normal_stiffness
     ks = joint.shear_stiffness
-    stored = 0.0
+    compliance = 1.0 / ks
+    ksdt = ks * dt
     friction_work = 0.0
     largest = 0.0
     for m in range(active.shape[0]):
         c = active[m]
         e = pairs.first[c]
         f = pairs.second[c]
-        facing = -(tangent[e, 0] * tangent[f, 0] + tangent[e, 1] * tangent[f, 1])
+        # Difference of the unit tangents: along the common tangent, of length sqrt(2 + 2 facing).
+        tx = node[e, TX] - node[f, TX]
+        ty = node[e, TY] - node[f, TY]
+        facing = 0.5 * (tx * tx + ty * ty) - 1.0
         if facing <= FACING_NONE:
-            pairs.shear[c, 0] = 0.0
-            pairs.shear[c, 1] = 0.0
-            pairs.flag[c, 0] = OPEN
-            pairs.flag[c, 1] = OPEN
-            pairs.live[c] = 0
+            if pairs.live[c] == 1:
+                _forget(pairs, c)
+                pairs.live[c] = 0
             continue
-        e2 = follow[e]
         f2 = follow[f]
-        scale = 1.0 / np.sqrt(2.0 + 2.0 * facing)
-        tx = (tangent[e, 0] - tangent[f, 0]) * scale
-        ty = (tangent[e, 1] - tangent[f, 1]) * scale
-        ox = xn[e, 0]
-        oy = xn[e, 1]
+        ox = node[e, X]
+        oy = node[e, Y]
         # Along the tangent: edge e runs from 0 to se, edge f from s1 (its end) to s0 (its start).
-        se = tangent[e, 2] * (tangent[e, 0] * tx + tangent[e, 1] * ty)
-        s0 = (xn[f, 0] - ox) * tx + (xn[f, 1] - oy) * ty
-        s1 = (xn[f2, 0] - ox) * tx + (xn[f2, 1] - oy) * ty
+        se = node[e, LENGTH] * (node[e, TX] * tx + node[e, TY] * ty)
+        s0 = (node[f, X] - ox) * tx + (node[f, Y] - oy) * ty
+        s1 = (node[f2, X] - ox) * tx + (node[f2, Y] - oy) * ty
         low = max(0.0, s1)
         high = min(se, s0)
-        length = high - low
-        if length <= 0.0:
-            pairs.shear[c, 0] = 0.0
-            pairs.shear[c, 1] = 0.0
-            pairs.flag[c, 0] = OPEN
-            pairs.flag[c, 1] = OPEN
-            pairs.live[c] = 0
+        if high <= low:
+            if pairs.live[c] == 1:
+                _forget(pairs, c)
+                pairs.live[c] = 0
             continue
         # Heights along the normal n = (ty, -tx), which points out of edge e.
-        he = tangent[e, 2] * (tangent[e, 0] * ty - tangent[e, 1] * tx)
-        h0 = (xn[f, 0] - ox) * ty - (xn[f, 1] - oy) * tx
-        h1 = (xn[f2, 0] - ox) * ty - (xn[f2, 1] - oy) * tx
-        de = 1.0 / se
-        df = 1.0 / (s0 - s1)
+        he = node[e, LENGTH] * (node[e, TX] * ty - node[e, TY] * tx)
+        h0 = (node[f, X] - ox) * ty - (node[f, Y] - oy) * tx
+        h1 = (node[f2, X] - ox) * ty - (node[f2, Y] - oy) * tx
+        apart = min(h0, h1) > max(0.0, he)
+        if apart and pairs.intact[c] == 0 and pairs.slip[c, 0] == 0.0 and pairs.slip[c, 1] == 0.0:
+            # Most chamfers end here, before any root or division.
+            if pairs.live[c] == 0 or pairs.flag[c, 0] != OPEN or pairs.flag[c, 1] != OPEN:
+                _forget(pairs, c)
+                pairs.live[c] = 1
+            continue
+        e2 = follow[e]
+        scale = 1.0 / np.sqrt(2.0 + 2.0 * facing)
+        de = 1.0 / (se * scale)
+        df = 1.0 / ((s0 - s1) * scale)
+        tx *= scale
+        ty *= scale
+        low *= scale
+        high *= scale
+        s0 *= scale
+        s1 *= scale
+        he *= scale
+        h0 *= scale
+        h1 *= scale
+        length = high - low
         gap0 = h1 + (h0 - h1) * (low - s1) * df - he * low * de
         gap1 = h1 + (h0 - h1) * (high - s1) * df - he * high * de
         overlap = -0.5 * (gap0 + gap1)
         if overlap > deepest:
             if pairs.live[c] == 1:
                 sums[0] += friction_work
-                sums[1] = stored
-                sums[2] = overlap
+                sums[1] = overlap
                 return c
             continue
         pairs.live[c] = 1
@@ -176,24 +207,27 @@ def contact_forces(active, pairs, follow, xn, vn, tangent, joint, deepest, dt, f
                 continue
             alpha = s * de
             beta = (s0 - s) * df
-            vx = vn[f, 0] + beta * (vn[f2, 0] - vn[f, 0]) - vn[e, 0] - alpha * (vn[e2, 0] - vn[e, 0])
-            vy = vn[f, 1] + beta * (vn[f2, 1] - vn[f, 1]) - vn[e, 1] - alpha * (vn[e2, 1] - vn[e, 1])
-            tau = pairs.shear[c, k] + ks * dt * (vx * tx + vy * ty)
+            vx = (1.0 - beta) * node[f, VX] + beta * node[f2, VX]
+            vx -= (1.0 - alpha) * node[e, VX] + alpha * node[e2, VX]
+            vy = (1.0 - beta) * node[f, VY] + beta * node[f2, VY]
+            vy -= (1.0 - alpha) * node[e, VY] + alpha * node[e2, VY]
+            tau = pairs.shear[c, k] + ksdt * (vx * tx + vy * ty)
             strength = joint.cohesion + sigma * joint.friction
             if strength < 0.0:
                 strength = 0.0
             flag = STICK
             if abs(tau) > strength:
                 limited = strength if tau > 0.0 else -strength
-                slid = (tau - limited) / ks
-                friction_work += abs(limited * slid) * area
+                slid = (tau - limited) * compliance
+                slip += slid
+                opened = joint.dilation * min(abs(slip), joint.dilation_limit) - open_by_dilation
+                friction_work += (limited * slid - sigma * opened) * area
                 tau = limited
-                pairs.slip[c, k] = slip + slid
+                pairs.slip[c, k] = slip
                 flag = SLIP
             if pairs.flag[c, k] != BROKEN:
                 pairs.flag[c, k] = flag
             pairs.shear[c, k] = tau
-            stored += 0.5 * area * (sigma * sigma / kn + tau * tau / ks)
             if -gap > largest:
                 largest = -gap
             # Traction on edge e: -sigma n + tau t, at a point midway between the edges. Seen from a point of
@@ -220,6 +254,91 @@ def contact_forces(active, pairs, follow, xn, vn, tangent, joint, deepest, dt, f
         fn[f2, 0] += ffx1
         fn[f2, 1] += ffy1
     sums[0] += friction_work
-    sums[1] = stored
-    sums[2] = largest
+    sums[1] = largest
     return -1
+
+
+@kernel
+def contact_state(pairs, follow, node, joint, deepest, out, ints):
+    """State of all touching candidates, for output. Returns (their number, stored joint energy [J/m]).
+
+    out : (n, 11) position x, y [m]; force on the first edge x, y [N/m]; mean normal (tension positive) and shear stress
+    [Pa]; length [m]; mean net slip [m]; mean opening [m]; unit tangent x, y. ints : (n, 2) pair and state flag.
+    """
+    count = 0
+    stored = 0.0
+    for c in range(pairs.key.shape[0]):
+        if pairs.live[c] == 0:
+            continue
+        e = pairs.first[c]
+        f = pairs.second[c]
+        facing = -(node[e, TX] * node[f, TX] + node[e, TY] * node[f, TY])
+        if facing <= FACING_NONE:
+            continue
+        f2 = follow[f]
+        scale = 1.0 / np.sqrt(2.0 + 2.0 * facing)
+        tx = (node[e, TX] - node[f, TX]) * scale
+        ty = (node[e, TY] - node[f, TY]) * scale
+        ox = node[e, X]
+        oy = node[e, Y]
+        se = node[e, LENGTH] * (node[e, TX] * tx + node[e, TY] * ty)
+        s0 = (node[f, X] - ox) * tx + (node[f, Y] - oy) * ty
+        s1 = (node[f2, X] - ox) * tx + (node[f2, Y] - oy) * ty
+        low = max(0.0, s1)
+        high = min(se, s0)
+        if high <= low:
+            continue
+        rise = node[e, LENGTH] * (node[e, TX] * ty - node[e, TY] * tx) / se
+        h0 = (node[f, X] - ox) * ty - (node[f, Y] - oy) * tx
+        h1 = (node[f2, X] - ox) * ty - (node[f2, Y] - oy) * tx
+        area = 0.5 * (high - low)
+        if facing < FACING_FULL:
+            area *= (facing - FACING_NONE) / (FACING_FULL - FACING_NONE)
+        normal = 0.0
+        shear = 0.0
+        gaps = 0.0
+        height = 0.0
+        worst = STICK
+        closed = 0
+        for k in range(2):
+            s = low if k == 0 else high
+            front = h1 + (h0 - h1) * (s - s1) / (s0 - s1)
+            gap = front - rise * s
+            gaps += 0.5 * gap
+            height += 0.25 * (front + rise * s)
+            flag = pairs.flag[c, k]
+            if flag == OPEN:
+                continue
+            opened = joint.dilation * min(abs(pairs.slip[c, k]), joint.dilation_limit)
+            sigma = joint.normal_stiffness * (opened - gap)
+            if flag == BROKEN and sigma <= 0.0:
+                continue
+            closed += 1
+            normal -= 0.5 * sigma
+            shear += 0.5 * pairs.shear[c, k]
+            stored += 0.5 * area * (
+                sigma * sigma / joint.normal_stiffness
+                + pairs.shear[c, k] * pairs.shear[c, k] / joint.shear_stiffness
+            )
+            if flag == SLIP and worst == STICK:
+                worst = SLIP
+            if flag == BROKEN:
+                worst = BROKEN
+        if -gaps > deepest:
+            continue
+        middle = 0.5 * (low + high)
+        out[count, 0] = ox + middle * tx + height * ty
+        out[count, 1] = oy + middle * ty - height * tx
+        out[count, 2] = 2.0 * area * (shear * tx + normal * ty)
+        out[count, 3] = 2.0 * area * (shear * ty - normal * tx)
+        out[count, 4] = normal
+        out[count, 5] = shear
+        out[count, 6] = 2.0 * area
+        out[count, 7] = 0.5 * (pairs.slip[c, 0] + pairs.slip[c, 1])
+        out[count, 8] = gaps
+        out[count, 9] = tx
+        out[count, 10] = ty
+        ints[count, 0] = c
+        ints[count, 1] = worst if closed > 0 else OPEN
+        count += 1
+    return count, stored

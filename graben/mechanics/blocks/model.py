@@ -9,7 +9,7 @@ import numpy as np
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks import search, zones
 from graben.mechanics.blocks.bodies import Bodies, Skin, chamfered_skin
-from graben.mechanics.blocks.joints import Joint, Pairs, node_motion
+from graben.mechanics.blocks.joints import COLUMNS, STICK, TX, TY, Joint, Pairs, contact_state, node_motion
 from graben.mechanics.failure import NumericsFailed
 
 
@@ -76,6 +76,7 @@ class BlockModel:
         else:
             self.dt = float(dt)
             mass = stiffness * dt**2 / (4.0 * SAFETY**2)
+        self.weight = self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :]
         self.mass_ratio = mass / self.true_mass
         self.skeleton = rx.Skeleton(
             bodies.zone_vertex,
@@ -90,13 +91,13 @@ class BlockModel:
             mass,
             np.zeros((nv, 2), dtype=np.int64),
             np.zeros((nv, 2)),
-            self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :],
+            self.weight.copy(),
             np.zeros((nv, 2)),
         )
         size = float(np.sqrt(np.median(bodies.block_area)))
         self.block_size = size
         self.reach = 0.15 * size
-        self.near = 0.012 * size
+        self.near = 0.004 * size
         self.deepest = 0.1 * size
         self.motion = rx.Motion(
             bodies.position.copy(),
@@ -104,16 +105,14 @@ class BlockModel:
             np.zeros((nv, 2)),
             np.zeros((nv, 2)),
             np.zeros((nv, 2)),
+            np.zeros((nn, COLUMNS)),
             np.zeros((nn, 2)),
-            np.zeros((nn, 2)),
-            np.zeros((nn, 2)),
-            np.zeros((nn, 3)),
             np.zeros((nn, 2)),
             np.zeros((nn, 2)),
             np.empty(0, dtype=np.int64),
             np.zeros(1, dtype=np.int64),
             np.zeros(8),
-            np.zeros(3),
+            np.zeros(2),
             np.zeros(5),
         )
         self.pairs: Pairs = search.no_pairs()
@@ -145,16 +144,15 @@ class BlockModel:
     def rebuild(self, first: bool = False) -> None:
         """Find the candidate contacts anew; joints found at the `first` call are intact."""
         m, s, skin = self.motion, self.skeleton, self.skin
-        node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.xn, m.vn, m.tangent)
-        if not np.all(np.isfinite(m.xn)):
+        node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.node)
+        if not np.all(np.isfinite(m.node)):
             raise NumericsFailed("a position is not finite", step=self.steps_done, advice=_SLOWER)
         slid = float(np.abs(self.pairs.slip).max()) if len(self.pairs.slip) else 0.0
         held = self.joint.dilation * min(slid, self.joint.dilation_limit)
         cell = max(self.block_size, float(np.sqrt(self._span.prod() / (4.0 * len(s.first)))))
         nx, ny = (int(n) for n in np.maximum(1, np.ceil(self._span / cell)))
         keys = search.find_keys(
-            m.xn,
-            m.tangent,
+            m.node,
             s.follow,
             skin.block,
             self.reach + held,
@@ -166,15 +164,30 @@ class BlockModel:
             self.pairs.key,
             self.pairs.live,
         )
-        self.pairs = search.carry_history(keys, len(s.first), self.pairs, 1 if first else 0)
+        self.pairs = search.carry_history(keys, len(s.first), self.pairs)
+        if first and self.joint.tension > 0.0:
+            self._bond()
         active = np.empty(len(keys), dtype=np.int64)
-        m.built[:] = m.xn
-        m.chosen[:] = m.xn
+        m.built[:] = m.node[:, :2]
+        m.chosen[:] = m.node[:, :2]
         self.motion = m._replace(active=active)
         self.motion.active_count[0] = search.choose_active(
-            self.pairs, s.follow, m.xn, m.tangent, self.near, self.joint.dilation, active
+            self.pairs, s.follow, m.node, self.near, self.joint.dilation, active
         )
         self.rebuilds += 1
+
+    def _bond(self) -> None:
+        """Mark as intact the pairs that face each other without a gap."""
+        p, node, follow = self.pairs, self.motion.node, self.skin.follow
+        facing = -(node[p.first, TX] * node[p.second, TX] + node[p.first, TY] * node[p.second, TY])
+        normal = np.column_stack([node[p.first, TY], -node[p.first, TX]])
+        far = np.zeros(len(p.key))
+        for end in (p.second, follow[p.second]):
+            gap = ((node[end, :2] - node[p.first, :2]) * normal).sum(axis=1)
+            far = np.maximum(far, np.abs(gap))
+        whole = (facing > 0.9999) & (far < 1e-6 * self.block_size)
+        p.intact[whole] = 1
+        p.flag[whole] = STICK
 
     def advance(self, steps: int) -> None:
         """Take `steps` time steps. Raises NumericsFailed when something runs away or blocks overlap too far."""
@@ -247,6 +260,12 @@ class BlockModel:
         np.add.at(target, a, half)
         np.add.at(target, c, half)
 
+    def boundary_force(self) -> np.ndarray:
+        """Forces (vertices, 2) of walls and pressures on the blocks [N/m]; gravity is none of them."""
+        s, m = self.skeleton, self.motion
+        load = s.steady + m.drive[rx.LOAD] * s.rising - self.weight
+        return load + np.where(s.held == 1, m.reaction, 0.0)
+
     def unbalanced_ratio(self) -> float:
         """Largest unbalanced force on a free vertex over the mean size of zone forces."""
         s, m = self.skeleton, self.motion
@@ -260,6 +279,17 @@ class BlockModel:
         s = self.skeleton
         return zones.zone_state(self.motion.x, s.triangles, s.gradient, s.area, s.lam, s.mu)[0]
 
+    def contacts(self) -> tuple[np.ndarray, np.ndarray, float]:
+        """Touching pairs: out (n, 11) and ints (n, 2) as in `joints.contact_state`, and the stored energy [J/m]."""
+        s, m = self.skeleton, self.motion
+        node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.node)
+        n = len(self.pairs.key)
+        out, ints = np.zeros((n, 11)), np.zeros((n, 2), dtype=np.int64)
+        count, stored = contact_state(
+            self.pairs, s.follow, m.node, self.joint, self.deepest, out, ints
+        )
+        return out[:count], ints[:count], stored
+
     def energies(self) -> dict[str, float]:
         """Energy ledger [J per m of thickness]; error = work put in - everything accounted for."""
         s, m, t = self.skeleton, self.motion, self.motion.tally
@@ -267,7 +297,7 @@ class BlockModel:
         e = {
             "kinetic": float(t[rx.KINETIC]),
             "strain": strain,
-            "joint": float(m.sums[rx.STORED]),
+            "joint": self.contacts()[2],
             "friction": float(m.sums[rx.FRICTION]),
             "damping": float(t[rx.DAMPED]),
             "boundary": float(t[rx.WALL_WORK]),

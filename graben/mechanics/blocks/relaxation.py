@@ -16,7 +16,7 @@ DONE, REBUILD, RUNAWAY, DEEP_OVERLAP = 0, 1, 2, 3
 # Places in Motion.tally
 KINETIC, DAMPED, ZONE_WORK, JOINT_WORK, LOAD_WORK, WALL_WORK, RATE_SEEN, DAMPED_SEEN = range(8)
 # Places in Motion.sums (kept by the contact kernel)
-FRICTION, STORED, LARGEST_OVERLAP = range(3)
+FRICTION, LARGEST_OVERLAP = range(2)
 # Places in Motion.drive
 DAMPING, LOAD, LOAD_STEP, SPEED, SPEED_STEP = range(5)
 
@@ -48,7 +48,7 @@ class Skeleton(NamedTuple):
 class Motion(NamedTuple):
     """What changes: positions and velocities of vertices and of contact nodes, forces, running sums.
 
-    x, v, zone_force, joint_force, reaction : (vertices, 2); xn, vn, fn : (nodes, 2); tangent : (nodes, 3)
+    x, v, zone_force, joint_force, reaction : (vertices, 2); node : node table (nodes, 8); fn : (nodes, 2)
     built, chosen : (nodes, 2) node positions at the last search and at the last choice of active pairs
     """
 
@@ -57,10 +57,8 @@ class Motion(NamedTuple):
     zone_force: np.ndarray
     joint_force: np.ndarray
     reaction: np.ndarray
-    xn: np.ndarray
-    vn: np.ndarray
+    node: np.ndarray
     fn: np.ndarray
-    tangent: np.ndarray
     built: np.ndarray
     chosen: np.ndarray
     active: np.ndarray
@@ -71,12 +69,12 @@ class Motion(NamedTuple):
 
 
 @kernel
-def _moved(xn, since):
+def _moved(node, since):
     """Largest squared distance that a node moved."""
     largest = 0.0
-    for i in range(xn.shape[0]):
-        dx = xn[i, 0] - since[i, 0]
-        dy = xn[i, 1] - since[i, 1]
+    for i in range(node.shape[0]):
+        dx = node[i, 0] - since[i, 0]
+        dy = node[i, 1] - since[i, 1]
         d = dx * dx + dy * dy
         # Written so that a nan counts as far.
         if not d <= largest:
@@ -106,18 +104,18 @@ def advance(
     keep = 0.98
     check = 0
     for step in range(steps):
-        node_motion(x, v, s.first, s.second, s.weight, s.follow, m.xn, m.vn, m.tangent)
+        node_motion(x, v, s.first, s.second, s.weight, s.follow, m.node)
         # How far nodes went is looked at every few steps; the speed cap makes that safe.
         if check == 0:
-            far = _moved(m.xn, m.chosen)
+            far = _moved(m.node, m.chosen)
             if not far < choose_at:
-                far = _moved(m.xn, m.built)
+                far = _moved(m.node, m.built)
                 if not far < rebuild_at:
                     return REBUILD, step, -1
                 m.active_count[0] = choose_active(
-                    pairs, s.follow, m.xn, m.tangent, near, joint.dilation, m.active
+                    pairs, s.follow, m.node, near, joint.dilation, m.active
                 )
-                m.chosen[:] = m.xn
+                m.chosen[:] = m.node[:, :2]
             check = 4
         check -= 1
         m.fn[:] = 0.0
@@ -127,9 +125,7 @@ def advance(
             m.active[: m.active_count[0]],
             pairs,
             s.follow,
-            m.xn,
-            m.vn,
-            m.tangent,
+            m.node,
             joint,
             deepest,
             dt,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from graben.mechanics.blocks.joints import FACING_NONE, OPEN, Pairs
+from graben.mechanics.blocks.joints import FACING_NONE, LENGTH, OPEN, TX, TY, Pairs, X, Y
 from graben.mechanics.compiled import kernel
 
 
 @kernel
-def find_keys(xn, tangent, follow, block, reach, deepest, low, cell, nx, ny, old_key, old_live):
+def find_keys(node, follow, block, reach, deepest, low, cell, nx, ny, old_key, old_live):
     """Sorted keys of the edge pairs whose boxes, each grown by reach / 2, meet.
 
     Left out: pairs of one block, pairs turned away from each other by more than reach can undo, and pairs that lie
@@ -24,8 +24,8 @@ def find_keys(xn, tangent, follow, block, reach, deepest, low, cell, nx, ny, old
     for e in range(n):
         f = follow[e]
         for d in range(2):
-            box[e, d] = min(xn[e, d], xn[f, d]) - half
-            box[e, 2 + d] = max(xn[e, d], xn[f, d]) + half
+            box[e, d] = min(node[e, d], node[f, d]) - half
+            box[e, 2 + d] = max(node[e, d], node[f, d]) + half
         cells[e, 0] = min(max(int((box[e, 0] - low[0]) / cell), 0), nx - 1)
         cells[e, 1] = min(max(int((box[e, 1] - low[1]) / cell), 0), ny - 1)
         cells[e, 2] = min(max(int((box[e, 2] - low[0]) / cell), 0), nx - 1)
@@ -64,11 +64,11 @@ def find_keys(xn, tangent, follow, block, reach, deepest, low, cell, nx, ny, old
                     ):
                         continue
                     key = min(e, f) * n + max(e, f)
-                    facing = -(tangent[e, 0] * tangent[f, 0] + tangent[e, 1] * tangent[f, 1])
-                    slack = 2.0 * reach / min(tangent[e, 2], tangent[f, 2])
+                    facing = -(node[e, TX] * node[f, TX] + node[e, TY] * node[f, TY])
+                    slack = 2.0 * reach / min(node[e, LENGTH], node[f, LENGTH])
                     if facing < FACING_NONE - slack:
                         continue
-                    if _middle_gap(xn, follow, e, f) < -deepest - reach:
+                    if _middle_gap(node, follow, e, f) < -deepest - reach:
                         m = np.searchsorted(old_key, key)
                         if m >= old_key.shape[0] or old_key[m] != key or old_live[m] == 0:
                             continue
@@ -82,7 +82,7 @@ def find_keys(xn, tangent, follow, block, reach, deepest, low, cell, nx, ny, old
 
 
 @kernel
-def _middle_gap(xn, follow, e, f):
+def _middle_gap(node, follow, e, f):
     """Largest distance of either edge's ends in front of the other edge [m]; negative when behind."""
     gap = -1e300
     for turn in range(2):
@@ -90,17 +90,17 @@ def _middle_gap(xn, follow, e, f):
         q = f if turn == 0 else e
         p2 = follow[p]
         q2 = follow[q]
-        dx = xn[p2, 0] - xn[p, 0]
-        dy = xn[p2, 1] - xn[p, 1]
+        dx = node[p2, X] - node[p, X]
+        dy = node[p2, Y] - node[p, Y]
         inverse = 1.0 / np.sqrt(dx * dx + dy * dy)
-        g0 = ((xn[q, 0] - xn[p, 0]) * dy - (xn[q, 1] - xn[p, 1]) * dx) * inverse
-        g1 = ((xn[q2, 0] - xn[p, 0]) * dy - (xn[q2, 1] - xn[p, 1]) * dx) * inverse
+        g0 = ((node[q, X] - node[p, X]) * dy - (node[q, Y] - node[p, Y]) * dx) * inverse
+        g1 = ((node[q2, X] - node[p, X]) * dy - (node[q2, Y] - node[p, Y]) * dx) * inverse
         gap = max(gap, g0, g1)
     return gap
 
 
 @kernel
-def carry_history(keys, nodes, old, intact):
+def carry_history(keys, nodes, old):
     """Candidate arrays for `keys`, with the history of those that were candidates before."""
     n = keys.shape[0]
     first = np.empty(n, dtype=np.int64)
@@ -109,7 +109,7 @@ def carry_history(keys, nodes, old, intact):
     slip = np.zeros((n, 2))
     flag = np.full((n, 2), OPEN, dtype=np.int64)
     live = np.zeros(n, dtype=np.int64)
-    whole = np.full(n, intact, dtype=np.int64)
+    whole = np.zeros(n, dtype=np.int64)
     m = 0
     for k in range(n):
         first[k] = keys[k] // nodes
@@ -133,7 +133,7 @@ def no_pairs() -> Pairs:
 
 
 @kernel
-def choose_active(pairs, follow, xn, tangent, reach, dilation, active):
+def choose_active(pairs, follow, node, reach, dilation, active):
     """Candidates that can touch before any node moves by reach / 2; the others sleep. Returns their number.
 
     A pair sleeps when it is too far apart along its normal or along its tangent, or turned away; what it remembers
@@ -143,27 +143,27 @@ def choose_active(pairs, follow, xn, tangent, reach, dilation, active):
     for c in range(pairs.key.shape[0]):
         e = pairs.first[c]
         f = pairs.second[c]
-        facing = -(tangent[e, 0] * tangent[f, 0] + tangent[e, 1] * tangent[f, 1])
-        slack = 2.0 * reach / min(tangent[e, 2], tangent[f, 2])
+        facing = -(node[e, TX] * node[f, TX] + node[e, TY] * node[f, TY])
+        slack = 2.0 * reach / min(node[e, LENGTH], node[f, LENGTH])
         awake = facing > FACING_NONE - slack
         if awake and facing > -0.9:
             scale = 1.0 / np.sqrt(2.0 + 2.0 * facing)
-            tx = (tangent[e, 0] - tangent[f, 0]) * scale
-            ty = (tangent[e, 1] - tangent[f, 1]) * scale
-            ox = xn[e, 0]
-            oy = xn[e, 1]
+            tx = (node[e, TX] - node[f, TX]) * scale
+            ty = (node[e, TY] - node[f, TY]) * scale
+            ox = node[e, X]
+            oy = node[e, Y]
             f2 = follow[f]
-            along = tangent[e, 0] * tx + tangent[e, 1] * ty
-            se = tangent[e, 2] * along
-            rise = tangent[e, 2] * (tangent[e, 0] * ty - tangent[e, 1] * tx)
-            s0 = (xn[f, 0] - ox) * tx + (xn[f, 1] - oy) * ty
-            s1 = (xn[f2, 0] - ox) * tx + (xn[f2, 1] - oy) * ty
-            h0 = (xn[f, 0] - ox) * ty - (xn[f, 1] - oy) * tx
-            h1 = (xn[f2, 0] - ox) * ty - (xn[f2, 1] - oy) * tx
+            along = node[e, TX] * tx + node[e, TY] * ty
+            se = node[e, LENGTH] * along
+            rise = node[e, LENGTH] * (node[e, TX] * ty - node[e, TY] * tx)
+            s0 = (node[f, X] - ox) * tx + (node[f, Y] - oy) * ty
+            s1 = (node[f2, X] - ox) * tx + (node[f2, Y] - oy) * ty
+            h0 = (node[f, X] - ox) * ty - (node[f, Y] - oy) * tx
+            h1 = (node[f2, X] - ox) * ty - (node[f2, Y] - oy) * tx
             length = min(se, s0) - max(0.0, s1)
             held = dilation * max(abs(pairs.slip[c, 0]), abs(pairs.slip[c, 1]))
             # A turn of the tangent shifts ends by at most their distance times the turn.
-            far = reach * (1.0 + (abs(h0) + abs(h1)) / min(tangent[e, 2], tangent[f, 2]))
+            far = reach * (1.0 + (abs(h0) + abs(h1)) / min(node[e, LENGTH], node[f, LENGTH]))
             if length < -2.0 * far or min(h0, h1) - max(0.0, rise) > 2.0 * far + held:
                 awake = False
         if awake:

@@ -1,0 +1,105 @@
+"""What a run leaves behind: states saved along the way, as plain arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from graben.mechanics.blocks import relaxation as rx
+from graben.mechanics.blocks.model import BlockModel
+
+ENERGIES = ("kinetic", "strain", "joint", "friction", "damping", "boundary", "external", "error")
+
+
+class History:
+    """Collects states of a model; the first one is the reference for displacements.
+
+    model : the model; begin : time of the first state [s] is taken as 0
+    """
+
+    def __init__(self, model: BlockModel) -> None:
+        self.model = model
+        self.start_time = model.time
+        self.reference = model.motion.x.copy()
+        self.time: list[float] = []
+        self.rows: dict[str, list[np.ndarray]] = {
+            name: []
+            for name in (
+                "displacement",
+                "velocity",
+                "zone_stress",
+                "boundary_force",
+                "wall_reaction",
+                "energy",
+                "contact",
+                "contact_pair",
+                "contact_state",
+            )
+        }
+        self.overlap: list[float] = []
+        self.damping: list[float] = []
+
+    def save(self) -> None:
+        """Append the present state."""
+        m, b = self.model, self.model.bodies
+        self.time.append(m.time - self.start_time)
+        out, ints, _ = m.contacts()
+        energy = m.energies()
+        force = m.boundary_force()
+        rows = self.rows
+        rows["displacement"].append(m.motion.x - self.reference)
+        rows["velocity"].append(m.motion.v.copy())
+        rows["zone_stress"].append(m.zone_stress())
+        rows["boundary_force"].append(force)
+        rows["wall_reaction"].append(side_forces(force, b.vertex_side))
+        rows["energy"].append(np.array([energy[k] for k in ENERGIES]))
+        rows["contact"].append(out)
+        pair = ints[:, 0]
+        ends = np.column_stack([m.pairs.first[pair], m.pairs.second[pair]])
+        rows["contact_pair"].append(m.skin.block[ends])
+        rows["contact_state"].append(ints[:, 1])
+        self.overlap.append(float(m.motion.sums[rx.LARGEST_OVERLAP]))
+        self.damping.append(float(m.motion.drive[rx.DAMPING]))
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Arrays of all saved states, named as in the artifact; contacts are ragged over time."""
+        b, rows = self.model.bodies, self.rows
+        contact = np.vstack(rows["contact"])
+        result = {
+            "time": np.array(self.time),
+            "vertex_position": self.reference,
+            "vertex_block": b.vertex_block,
+            "zone_vertex": b.zone_vertex,
+            "zone_block": b.zone_block,
+            "block_area": b.block_area,
+            "block_corner_count": np.diff(b.block_start),
+            "block_corner": b.block_corner,
+            "contact_count": np.array([len(c) for c in rows["contact"]]),
+            "contact_block": np.vstack(rows["contact_pair"]),
+            "contact_position": contact[:, 0:2],
+            "contact_force": contact[:, 2:4],
+            "contact_normal_stress": contact[:, 4],
+            "contact_shear_stress": contact[:, 5],
+            "contact_length": contact[:, 6],
+            "contact_slip": contact[:, 7],
+            "contact_opening": contact[:, 8],
+            "contact_tangent": contact[:, 9:11],
+            "contact_state": np.concatenate(rows["contact_state"]),
+        }
+        for name in ("displacement", "velocity", "zone_stress", "boundary_force", "wall_reaction"):
+            result[name] = np.array(rows[name])
+        energy = np.array(rows["energy"])
+        for k, name in enumerate(ENERGIES):
+            result["energy_" + name] = energy[:, k]
+        return result
+
+
+def side_forces(force: np.ndarray, vertex_side: np.ndarray) -> np.ndarray:
+    """External force (sides, 2) on each side of the domain [N/m]; a corner counts half for each of its sides."""
+    share = vertex_side / np.maximum(1, vertex_side.sum(axis=1))[:, None]
+    return share.T @ force
+
+
+def mean_stress(zone_stress: np.ndarray, area: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Area mean (..., 4) of zone stresses (..., zones, 4) over the zones inside [Pa]."""
+    w = area[inside] / area[inside].sum()
+    return np.einsum("z,...zc->...c", w, zone_stress[..., inside, :])

@@ -1,0 +1,76 @@
+"""Blocks: states of an assembly of deformable blocks, with all that averaging needs."""
+
+from __future__ import annotations
+
+from graben.schemas.artifact import Layout, Variable
+
+_T, _V, _Z, _B, _C = ("time",), ("vertex",), ("zone",), ("block",), ("contact",)
+
+
+def _energy(long_name: str) -> Variable:
+    return Variable(_T, "J m-1", long_name)
+
+
+LAYOUT = Layout(
+    kind="blocks",
+    version=1,
+    title="Jointed rock as deformable blocks",
+    dims={
+        "time": "saved states; the first is the start of loading, after consolidation",
+        "vertex": "grid points; each block owns its own",
+        "zone": "constant-strain triangles, counter-clockwise",
+        "zone_corner": "the three vertices of a zone",
+        "block": "blocks",
+        "corner": "corners of all blocks, block by block, counter-clockwise",
+        "contact": "touching edges of two blocks, state after state (contact_count of each)",
+        "pair": "first and second block of a contact",
+        "wall": "sides of the domain, from corner k of the outline to corner k + 1",
+        "axis": "x, y (y is up)",
+        "component": "xx, yy, zz, xy",
+    },
+    variables={
+        "time": Variable(_T, "s", "time since the first state"),
+        "vertex_position": Variable(("vertex", "axis"), "m", "position at the first state"),
+        "vertex_block": Variable(_V, "1", "block of the vertex", dtype="i4"),
+        "zone_vertex": Variable(("zone", "zone_corner"), "1", "vertices of the zone", dtype="i4"),
+        "zone_block": Variable(_Z, "1", "block of the zone", dtype="i4"),
+        "block_area": Variable(_B, "m2", "area of the block, unstressed"),
+        "block_corner_count": Variable(_B, "1", "corners of the block", dtype="i4"),
+        "block_corner": Variable(("corner",), "1", "vertex of the corner", dtype="i4"),
+        "displacement": Variable(("time", "vertex", "axis"), "m", "displacement since the first state"),
+        "velocity": Variable(("time", "vertex", "axis"), "m s-1", "velocity"),
+        "zone_stress": Variable(("time", "zone", "component"), "Pa", "Cauchy stress, tension positive"),
+        "boundary_force": Variable(
+            ("time", "vertex", "axis"), "N m-1", "force of walls and pressures on the vertex, per thickness"
+        ),
+        "wall_reaction": Variable(("time", "wall", "axis"), "N m-1", "sum of boundary_force along the side"),
+        "confining_stress": Variable((), "Pa", "normal stress applied to the lateral sides, tension positive"),
+        "outline": Variable(("wall", "axis"), "m", "corners of the domain before consolidation"),
+        "contact_count": Variable(_T, "1", "contacts of the state", dtype="i4"),
+        "contact_block": Variable(("contact", "pair"), "1", "blocks of the contact", dtype="i4"),
+        "contact_position": Variable(("contact", "axis"), "m", "middle of the contact"),
+        "contact_tangent": Variable(("contact", "axis"), "1", "unit vector along the contact"),
+        "contact_force": Variable(("contact", "axis"), "N m-1", "force on the first block, per thickness"),
+        "contact_normal_stress": Variable(_C, "Pa", "mean normal stress, tension positive"),
+        "contact_shear_stress": Variable(_C, "Pa", "mean shear stress on the first block, along the tangent"),
+        "contact_length": Variable(_C, "m", "length over which the edges face each other"),
+        "contact_slip": Variable(_C, "m", "net plastic sliding, mean of both ends"),
+        "contact_opening": Variable(_C, "m", "gap, mean of both ends; negative: overlap"),
+        "contact_state": Variable(
+            _C,
+            "1",
+            "state of the contact",
+            dtype="i1",
+            attributes={"flag_values": [0, 1, 2, 3], "flag_meanings": "stick slip open broken"},
+        ),
+        "energy_kinetic": _energy("kinetic energy (of the scaled masses)"),
+        "energy_strain": _energy("strain energy of the zones"),
+        "energy_joint": _energy("energy stored in the joints"),
+        "energy_friction": _energy("energy taken by sliding since the first state"),
+        "energy_damping": _energy("energy taken by damping since the first state"),
+        "energy_boundary": _energy("work of moving walls since the first state"),
+        "energy_external": _energy("work of pressures and gravity since the first state"),
+        "energy_error": _energy("work done on the blocks less everything accounted for"),
+    },
+    attributes={"thickness_m": "1"},
+)
