@@ -205,7 +205,7 @@ def simulate(
     }
     energy = {name: table[:, 9 + i] for i, name in enumerate(ENERGIES)}
     return ScratchRun(
-        phases=tuple(p.name for p in phases) + ("rest",),
+        phases=(*(p.name for p in phases), "rest"),
         time=table[:, 1],
         phase=table[:, 0].astype(np.int64),
         tip=table[:, 2:5],
@@ -215,7 +215,7 @@ def simulate(
         error=table[:, -1],
         loaded=loaded,
         unloaded=unloaded,
-        frames=kept + [unloaded],
+        frames=[*kept, unloaded],
         first_volumes=body.first_volumes,
         cost=cost,
     )
