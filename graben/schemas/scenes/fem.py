@@ -1,0 +1,175 @@
+"""Scene of fem-run: a plane-strain body under gravity and rising pressures. The defaults are Y's slope, 4.5."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Self
+
+from pydantic import model_validator
+
+from graben.schemas.quantities import Acceleration, Density, Length, Pressure, PressureRate, Time, key
+from graben.schemas.scene import InputFile, Model, Scene
+from graben.schemas.scenes.material import MaterialTable
+
+Point = tuple[Length, Length]
+
+_SLOPE_CORNERS: Any = [
+    ["0 m", "0 m"],
+    ["30 m", "0 m"],
+    ["50 m", "0 m"],
+    ["60 m", "0 m"],
+    ["80 m", "0 m"],
+    ["0 m", "20 m"],
+    ["30 m", "20 m"],
+    ["50 m", "20 m"],
+    ["60 m", "20 m"],
+    ["80 m", "20 m"],
+    ["40 m", "50 m"],
+    ["55 m", "50 m"],
+    ["60 m", "50 m"],
+    ["80 m", "50 m"],
+]
+_SLOPE_PATCHES: Any = [
+    [0, 1, 6, 5],
+    [1, 2, 7, 6],
+    [2, 3, 8, 7],
+    [3, 4, 9, 8],
+    [6, 7, 11, 10],
+    [7, 8, 12, 11],
+    [8, 9, 13, 12],
+]
+_SLOPE_OUTLINE: Any = [
+    ["0 m", "0 m"],
+    ["80 m", "0 m"],
+    ["80 m", "50 m"],
+    ["40 m", "50 m"],
+    ["30 m", "20 m"],
+    ["0 m", "20 m"],
+]
+_UNDER_LOAD: Any = {"start": ["55 m", "50 m"], "end": ["60 m", "50 m"], "size": "0.4 m", "growth": 0.05}
+_SLOPE_SUPPORTS: Any = [
+    {"name": "left", "start": ["0 m", "0 m"], "end": ["0 m", "20 m"], "fix": "x"},
+    {"name": "right", "start": ["80 m", "0 m"], "end": ["80 m", "50 m"], "fix": "x"},
+    {"name": "base", "start": ["0 m", "0 m"], "end": ["80 m", "0 m"], "fix": "y"},
+]
+_SLOPE_LOADS: Any = [
+    {"name": "backslope", "start": ["55 m", "50 m"], "end": ["60 m", "50 m"], "rate": "0.25 MPa/s"}
+]
+# A stand-in for a jointed granite until a calibrated law is chained: --material FILE replaces it.
+_ROCK_MASS: Any = {
+    "law": "drucker-prager",
+    "parameters": {
+        "young_modulus": "1.9 GPa",
+        "poisson_ratio": 0.3,
+        "friction_angle": "50 deg",
+        "dilation_angle": "10 deg",
+        "hardening": "exponential",
+        "initial_yield": "0.2 MPa",
+        "hardening_gain": "1 MPa",
+        "hardening_rate": 300.0,
+    },
+}
+
+
+class Refine(Model):
+    """Smaller elements near a segment."""
+
+    start: Point = key(..., "one end of the segment")
+    end: Point = key(..., "the other end (the same point for a spot)")
+    size: Length = key(..., "element size at the segment", gt=0)
+    growth: float = key(0.1, "growth of the size per metre of distance", ge=0)
+
+
+class Mesh(Model):
+    """How the body is meshed."""
+
+    method: Literal["mapped", "paved", "file"] = key(
+        "mapped",
+        "mapped: structured grids in convex quadrilateral patches (best shapes); paved: any simple polygon; "
+        "file: quads of a file that meshio reads",
+    )
+    size: Length = key("1.8 m", "element size away from refinements, at standard fidelity", gt=0)
+    refine: list[Refine] = key([_UNDER_LOAD], "a segment with smaller elements near it (repeatable)")
+    corners: list[Point] = key(_SLOPE_CORNERS, "mapped: corner points of the patches")
+    patches: list[tuple[int, int, int, int]] = key(
+        _SLOPE_PATCHES, "mapped: four corner numbers (from 0) of each patch, in order around it"
+    )
+    outline: list[Point] = key(_SLOPE_OUTLINE, "paved: corner points of the polygon, in order")
+    file: InputFile | None = key(None, "file: mesh file with 4-node quads (Gmsh, VTU, Abaqus, ...), coordinates in m")
+    draft_factor: float = key(2.4, "all sizes are multiplied by this at draft fidelity", ge=1)
+    reference_factor: float = key(0.33, "all sizes are multiplied by this at reference fidelity", gt=0, le=1)
+
+    @model_validator(mode="after")
+    def _file_for_method(self) -> Self:
+        if self.method == "file" and self.file is None:
+            raise ValueError('a mesh file, because method = "file"')
+        if self.method == "paved" and len(self.outline) < 3:
+            raise ValueError("an outline of at least three points")
+        return self
+
+
+class Support(Model):
+    """Prescribed zero displacement along a segment of the outline."""
+
+    name: str = key("support", "name, for messages")
+    start: Point = key(..., "one end of the segment")
+    end: Point = key(..., "the other end")
+    fix: Literal["x", "y", "both"] = key("both", "displacement held at zero: x or y (a roller), or both")
+
+
+class Load(Model):
+    """Pressure on a part of the outline: a steady part, and one that rises after gravity."""
+
+    name: str = key("load", "name, for messages")
+    start: Point = key(..., "one end of the loaded segment")
+    end: Point = key(..., "the other end")
+    pressure: Pressure = key("0 Pa", "pressure from the start, applied with gravity; pushes into the body")
+    rate: PressureRate = key("0 Pa/s", "rise of the pressure after gravity")
+
+
+class Gravity(Model):
+    """Weight, applied first, in load steps of its own."""
+
+    density: Density = key("2700 kg/m^3", "bulk density", ge=0)
+    horizontal: Acceleration = key("0 m/s^2", "acceleration along x")
+    vertical: Acceleration = key("-9.81 m/s^2", "acceleration along y (upwards positive)")
+
+
+class Stepping(Model):
+    """Load steps and their equilibrium."""
+
+    goal: Literal["failure", "end"] = key(
+        "failure",
+        "failure: the load at which no equilibrium is found is the result; end: not reaching the end is an error",
+    )
+    end: Time = key("100 s", "length of the load history after gravity", gt=0)
+    first: Time = key("1 s", "first step", gt=0)
+    largest: Time = key("2 s", "largest step", gt=0)
+    smallest: Time = key("0.02 s", "a step that fails is halved; failure is declared below this length", gt=0)
+    save_every: Time = key("4 s", "load time between saved states (the last state is always saved)", gt=0)
+    tolerance: float = key(1e-6, "unbalanced force over the largest of loads and reactions", gt=0, lt=1e-2)
+    max_iterations: int = key(20, "factorisations per step", ge=3)
+    extrapolate: bool = key(True, "start each step from the last increment (fewer iterations on a smooth path)")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.smallest <= self.first <= self.largest:
+            raise ValueError("steps with smallest <= first <= largest")
+        return self
+
+
+class FemScene(Scene):
+    """A plane-strain body of quads, loaded by gravity and then by pressures up to failure."""
+
+    kind: Literal["fem"]
+    mesh: Mesh = key(Mesh(), "the mesh")
+    material: MaterialTable = key(_ROCK_MASS, "constitutive law and its parameters, or a file that holds them")
+    gravity: Gravity = key(Gravity(), "weight")
+    supports: list[Support] = key(_SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)", min_length=1)
+    loads: list[Load] = key(_SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)", min_length=1)
+    stepping: Stepping = key(Stepping(), "load steps")
+
+    @model_validator(mode="after")
+    def _something_rises(self) -> Self:
+        if self.stepping.goal == "failure" and not any(load.rate > 0 for load in self.loads):
+            raise ValueError('a load with a positive rate, because stepping.goal = "failure"')
+        return self

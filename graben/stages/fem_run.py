@@ -1,0 +1,243 @@
+"""fem-run: gravity, then rising pressures on a plane-strain body, up to the load that it cannot carry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from graben.mechanics.continuum.body import Body, Material, State, make_body
+from graben.mechanics.continuum.march import March, StepOptions, march
+from graben.mechanics.continuum.mesh2d import QuadMesh
+from graben.mechanics.continuum.newton import NewtonOptions, Step
+from graben.mechanics.continuum.quads import body_force, edge_traction
+from graben.mechanics.continuum.stability import softest_stiffness
+from graben.mechanics.failure import NumericsFailed
+from graben.mechanics.materials.laws import LAWS
+from graben.schemas.faults import BadInput, Fault
+from graben.schemas.files import refuse_existing
+from graben.schemas.scene import load_scene
+from graben.schemas.scenes.fem import FemScene
+from graben.schemas.scenes.material import read_material
+from graben.stages.fem_mesh import mesh_of
+from graben.stages.fem_output import History, write_run
+from graben.stages.record import Progress, Record, silent
+
+# Gravity is a load history of its own, of unit length, in steps that are halved as the pressures' are.
+_GRAVITY_STEPS = StepOptions(first=0.1, largest=0.5, smallest=1e-3)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A scene in arrays.
+
+    Attributes
+    ----------
+    steady, rising : (2 n,) nodal loads: applied with gravity, and per second after it
+    unit_pressure : (2 n,) nodal loads of 1 Pa on the first rising load's segment; loaded_length its length, m
+    """
+
+    body: Body
+    support_nodes: list[np.ndarray]
+    steady: np.ndarray
+    rising: np.ndarray
+    unit_pressure: np.ndarray
+    loaded_length: float
+    rate: float
+    offset: float
+
+    def external(self, time: float) -> np.ndarray:
+        """Nodal loads (2 n,), N/m, at a load time after gravity, s."""
+        return self.steady + time * self.rising
+
+
+def run(
+    scene_path: Path,
+    output: Path,
+    *,
+    material: Path | None = None,
+    overrides: Iterable[str] = (),
+    overwrite: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Run a fem scene and write its artifact and VTU files.
+
+    Parameters
+    ----------
+    material : a file with law and parameters that replaces the scene's
+
+    Returns
+    -------
+    headline numbers: failure_load_pa (None when the end was reached without failure), failed, largest_load_pa,
+    settlement_m of the loaded segment, compliance_ratio and stiffness_ratio (evidence of collapse), elements,
+    steps, energy_error
+
+    Raises
+    ------
+    BadInput : the scene, the mesh or the material has faults, or the output exists
+    NumericsFailed : no equilibrium under gravity, or before the end where the goal is the end
+    """
+    scene: FemScene = load_scene(scene_path, "fem", overrides)
+    refuse_existing(output, overwrite)
+    law, inputs = _material(scene, material)
+    if scene.mesh.method == "file" and scene.mesh.file is not None:
+        inputs = [*inputs, scene.mesh.file]
+    record = Record.begin(scene, inputs)
+    progress(0.0, "meshing")
+    problem = _problem(scene, mesh_of(scene), law)
+    body = problem.body
+    progress(0.01, f"{len(body.mesh.quads)} elements; gravity")
+    newton = NewtonOptions(scene.stepping.tolerance, scene.stepping.max_iterations)
+    settled = march(body, body.untouched(), lambda t: t * problem.steady, 0.0, 1.0, _GRAVITY_STEPS, newton)
+    if not settled.complete:
+        raise NumericsFailed(
+            f"no equilibrium beyond {100 * settled.time:.3g} % of gravity ({settled.reason})",
+            advice="the body does not stand under its own weight: check supports, strength and density",
+        )
+    history = History(scene, problem.body, settled, problem.unit_pressure / problem.loaded_length, problem.offset)
+    loaded = _load_up(scene, problem, settled, newton, history, progress)
+    failed = not loaded.complete
+    headline = _headline(scene, problem, settled, loaded, history)
+    record.cost.update(_cost(body, settled, loaded, headline))
+    target = output
+    if failed and scene.stepping.goal == "end":
+        target = output.with_name(f"{output.stem}.last-good{output.suffix}")
+    progress(0.98, "writing")
+    write_run(target, record, scene, body, settled, history, problem.support_nodes, problem.external, headline)
+    if target != output:
+        raise NumericsFailed(
+            f"no equilibrium beyond load time {loaded.time:.6g} s of {scene.stepping.end:g} s ({loaded.reason}); "
+            f"states up to there are in {target}",
+            step=len(loaded.iterations),
+            advice='set stepping.goal = "failure" if this load is what you want, or lower stepping.smallest',
+        )
+    progress(1.0, "done")
+    return headline
+
+
+def _material(scene: FemScene, replacement: Path | None) -> tuple[Material, list[Path]]:
+    """The law with packed parameters, and the files that it came from."""
+    source = replacement if replacement is not None else scene.material.file
+    name, values = read_material(replacement) if replacement is not None else scene.material.resolve()
+    law = LAWS[name]
+    faults = law.faults(values)
+    if faults:
+        file, prefix = (str(scene.source.path), "material.") if source is None else (str(source), "")
+        shown = [Fault(file, f"{prefix}parameters.{n}", str(values.get(n, "(absent)")), e) for n, e in faults]
+        raise BadInput(shown)
+    parameters = law.pack(values)
+    return Material(law.id, parameters, law.initial_state(parameters)), [] if source is None else [source]
+
+
+def _problem(scene: FemScene, mesh: QuadMesh, law: Material) -> Problem:
+    file = str(scene.source.path)
+    faults: list[Fault] = []
+    fixed = np.zeros((len(mesh.points), 2), dtype=bool)
+    support_nodes = []
+    for k, support in enumerate(scene.supports):
+        nodes = mesh.nodes_on_segment(np.array(support.start), np.array(support.end))
+        if not len(nodes):
+            faults.append(Fault(file, f"supports.{k}", support.name, "a segment that holds nodes of the mesh"))
+        fixed[nodes, 0] |= support.fix in ("x", "both")
+        fixed[nodes, 1] |= support.fix in ("y", "both")
+        support_nodes.append(nodes)
+    if not faults and not _holds_still(mesh, fixed):
+        faults.append(Fault(file, "supports", "", "supports that leave the body no rigid motion"))
+    weight = np.array([scene.gravity.horizontal, scene.gravity.vertical])
+    steady = body_force(mesh, scene.gravity.density, weight)
+    rising = np.zeros_like(steady)
+    unit, length, rate, offset = np.zeros_like(steady), 1.0, 0.0, 0.0
+    for k, load in enumerate(scene.loads):
+        try:
+            force, covered = edge_traction(mesh, np.array(load.start), np.array(load.end))
+        except ValueError as error:
+            faults.append(Fault(file, f"loads.{k}", load.name, f"a segment of the outline ({error})"))
+            continue
+        steady += load.pressure * force
+        rising += load.rate * force
+        if load.rate != 0 and rate == 0:
+            unit, length, rate, offset = force, covered, load.rate, load.pressure
+    if faults:
+        raise BadInput(faults)
+    body = make_body(mesh, [law], fixed.ravel())
+    return Problem(body, support_nodes, steady, rising, unit, length, rate, offset)
+
+
+def _holds_still(mesh: QuadMesh, fixed: np.ndarray) -> bool:
+    """Whether the supports stop both translations and the rotation."""
+    x, y = (mesh.points - mesh.points.mean(axis=0)).T
+    rigid = np.zeros((len(x), 2, 3))
+    rigid[:, 0, 0], rigid[:, 1, 1] = 1.0, 1.0
+    rigid[:, 0, 2], rigid[:, 1, 2] = -y / mesh.diameter(), x / mesh.diameter()
+    return int(np.linalg.matrix_rank(rigid[fixed], tol=1e-6)) == 3 if fixed.any() else False
+
+
+def _load_up(
+    scene: FemScene,
+    problem: Problem,
+    settled: March,
+    newton: NewtonOptions,
+    history: History,
+    progress: Progress,
+) -> March:
+    options = scene.stepping
+
+    def accepted(time: float, state: State, force: np.ndarray, step: Step) -> None:
+        history.add(time, state, force, step.iterations, problem.offset + problem.rate * time)
+        pressure = (problem.offset + problem.rate * time) / 1e6
+        progress(0.02 + 0.95 * time / options.end, f"{time:.4g} s, {pressure:.4g} MPa, {step.iterations} iterations")
+
+    return march(
+        problem.body,
+        settled.state,
+        problem.external,
+        0.0,
+        options.end,
+        StepOptions(options.first, options.largest, options.smallest, extrapolate=options.extrapolate),
+        newton,
+        save_times=np.arange(options.save_every, options.end, options.save_every),
+        accepted=accepted,
+    )
+
+
+def _headline(
+    scene: FemScene, problem: Problem, settled: March, loaded: March, history: History
+) -> dict[str, Any]:
+    pressure = problem.offset + problem.rate * loaded.time
+    failed = not loaded.complete
+    elastic = softest_stiffness(problem.body, settled.state)
+    last = loaded.state
+    stiffness = elastic
+    if history.previous is not None:
+        increment = last.displacement - history.previous.displacement
+        stiffness = softest_stiffness(problem.body, last, increment, history.previous)
+    return {
+        "failure_load_pa": pressure if failed else None,
+        "failed": failed,
+        "largest_load_pa": pressure,
+        "next_load_refused_pa": pressure + problem.rate * scene.stepping.smallest if failed else None,
+        "settlement_m": history.settlement[-1],
+        "compliance_ratio": history.compliance_ratio(),
+        "stiffness_ratio": stiffness / elastic if elastic > 0 else 0.0,
+        "reason": loaded.reason,
+        "elements": len(problem.body.mesh.quads),
+        "steps": len(loaded.iterations),
+        "energy_error": max(settled.energy_error(), loaded.energy_error()),
+    }
+
+
+def _cost(body: Body, settled: March, loaded: March, headline: dict[str, Any]) -> dict[str, Any]:
+    residuals = [r[-1] for r in settled.residuals + loaded.residuals]
+    return {
+        "elements": len(body.mesh.quads),
+        "degrees_of_freedom": len(body.free),
+        "smallest_element_m": float(body.elements.length.min()),
+        "steps": len(settled.iterations) + len(loaded.iterations),
+        "rejected_steps": settled.rejected + loaded.rejected,
+        "factorisations": settled.factorisations + loaded.factorisations,
+        "largest_residual": max(residuals, default=0.0),
+        "energy_error": headline["energy_error"],
+    }
