@@ -1,0 +1,49 @@
+"""calibrate: parameters of a constitutive law from stress-strain curves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from graben.cli.options import FILE, Session, Tool, scene_argument, set_option, stage_options
+
+
+@click.command("calibrate", cls=Tool)
+@scene_argument
+@click.argument("curves", type=FILE, nargs=-1, metavar="[CURVES]...")
+@click.option(
+    "--validate",
+    type=FILE,
+    multiple=True,
+    help="Predict the curves of this file too, without fitting them (repeatable): validation_rmse_pa.",
+)
+@set_option
+@stage_options
+def main(
+    session: Session,
+    scene: Path,
+    curves: tuple[Path, ...],
+    validate: tuple[Path, ...],
+    overrides: tuple[str, ...],
+    output: Path,
+    overwrite: bool,
+) -> None:
+    """Fit a constitutive law to stress-strain CURVES (artifacts of homogenize, or CSV).
+
+    CURVES replace those of the scene. Writes one NetCDF artifact, and NAME.material.toml beside it, which
+    fem-run and scratch take as it is.
+    """
+    from graben.stages import calibrate
+
+    with session.progress() as progress:
+        headline = calibrate.run(
+            scene,
+            output,
+            curves=curves,
+            validate=validate,
+            overrides=overrides,
+            overwrite=overwrite,
+            progress=progress,
+        )
+    session.report(headline)
