@@ -119,6 +119,14 @@ class ScratchRun:
     cost: dict[str, float] = field(default_factory=dict)
 
 
+class ScratchFailed(NumericsFailed):
+    """A run that cannot go on, with the last good state that was kept."""
+
+    def __init__(self, failure: NumericsFailed, last_good: Snapshot) -> None:
+        super().__init__(failure.what, where=failure.where, step=failure.step, advice=failure.advice)
+        self.last_good = last_good
+
+
 def simulate(
     mesh: HexMesh,
     law: int,
@@ -144,7 +152,7 @@ def simulate(
 
     Raises
     ------
-    NumericsFailed : energy or volume error beyond its limit, an inverted element, a law that gives up, or more added
+    ScratchFailed : energy or volume error beyond its limit, an inverted element, a law that gives up, or more added
         mass than allowed
     """
     began = clock_module.perf_counter()
@@ -166,14 +174,19 @@ def simulate(
     if slide and frames > 0:
         marks = ends[slide[0]] - phases[slide[0]].duration * np.arange(frames, 0, -1) / (frames + 1.0)
     loaded: Snapshot | None = None
+    last_good = body.snapshot("start")
     reference = 0.0
     mark = 0
     for index, phase in enumerate(phases):
         while body.time < ends[index] - 1e-9 * ends[-1]:
-            steps = body.refresh(until=float(ends[index]))
-            body.advance(steps)
-            reference = max(reference, body.external)
-            rows.append((index, *_record(body, numerics, reference, damage is not None, index == 0)))
+            try:
+                body.advance(body.refresh(until=float(ends[index])))
+                reference = max(reference, body.external)
+                rows.append((index, *_record(body, numerics, reference, damage is not None, index == 0)))
+            except NumericsFailed as failure:
+                raise ScratchFailed(failure, last_good) from None
+            if len(rows) % 20 == 0:
+                last_good = body.snapshot("last-good")
             if mark < len(marks) and body.time >= marks[mark]:
                 kept.append(body.snapshot(f"slide-{mark + 1}"))
                 mark += 1

@@ -1,0 +1,41 @@
+"""scratch: a rigid grain indents a metal specimen, slides and lifts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from graben.cli.options import FILE, Session, Tool, scene_argument, set_option, stage_options
+
+
+@click.command("scratch", cls=Tool)
+@scene_argument
+@click.option(
+    "--material",
+    type=FILE,
+    help="Use this law and its parameters instead of the scene's: NAME.material.toml or calibrate's artifact.",
+)
+@set_option
+@stage_options
+def main(
+    session: Session,
+    scene: Path,
+    material: Path | None,
+    overrides: tuple[str, ...],
+    output: Path,
+    overwrite: bool,
+) -> None:
+    """Scratch a specimen with one rigid grain (kind "scratch") and measure the groove.
+
+    Writes one NetCDF artifact with forces, sections and energies, and VTU files with a PVD beside it for ParaView.
+    Without damage the degree of wear is a transient: it comes with the path over contact half-width (s_over_a) at
+    which it was measured.
+    """
+    from graben.stages import scratch
+
+    with session.progress() as progress:
+        headline = scratch.run(
+            scene, output, material=material, overrides=overrides, overwrite=overwrite, progress=progress
+        )
+    session.report(headline)

@@ -1,0 +1,146 @@
+"""Scene of scratch: one rigid grain pressed into a metal specimen, slid, and lifted. Defaults follow H 8.2."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal, Self
+
+from pydantic import model_validator
+
+from graben.schemas.quantities import Density, Length, key
+from graben.schemas.scene import Model, Scene
+from graben.schemas.scenes.material import MaterialTable
+
+# Approximate true stress-strain curve of St-52 (S355): Swift's sigma = 760 MPa (0.0154 + p)^0.166, which starts at
+# 380 MPa and reaches an engineering strength near 490 MPa. H prints the curve as a figure only (8.4).
+_ST52: Any = {
+    "law": "j2",
+    "parameters": {
+        "young_modulus": "210 GPa",
+        "poisson_ratio": 0.33,
+        "hardening": [
+            [0.0, "380 MPa"],
+            [0.02, "436 MPa"],
+            [0.05, "483 MPa"],
+            [0.1, "531 MPa"],
+            [0.2, "589 MPa"],
+            [0.5, "681 MPa"],
+            [1.0, "762 MPa"],
+            [2.0, "854 MPa"],
+            [4.0, "957 MPa"],
+        ],
+    },
+}
+
+
+class Specimen(Model):
+    """Block whose upper surface is scratched; base, ends and sides are held. One half is computed."""
+
+    length: Length = key("200 um", "length, along the scratch", gt=0)
+    width: Length = key("100 um", "width across the scratch (whole specimen)", gt=0)
+    thickness: Length = key(
+        "15 um", "thickness; the plastic zone of a 2 um dent reaches a base at 15 um (H), 30 um frees it", gt=0
+    )
+    density: Density = key(
+        "7800 kg/m^3", "density; speeds are shares of the wave speed, so it sets the clock only", gt=0
+    )
+
+
+class Mesh(Model):
+    """Bricks: fine under the path, growing outside."""
+
+    size: Length = key("1.5 um", "edge under the path at standard fidelity", gt=0)
+    growth: float = key(1.25, "ratio of neighbouring edges outside the fine range", ge=1, le=2)
+    growth_depth: float = key(1.12, "the same from the surface down", ge=1, le=2)
+    draft_factor: float = key(1.7, "the edge is multiplied by this at draft fidelity", ge=1)
+    reference_factor: float = key(0.75, "the edge is multiplied by this at reference fidelity", gt=0, le=1)
+
+
+class Tip(Model):
+    """Rigid sphere and its path."""
+
+    radius: Length = key("50 um", "radius of the sphere", gt=0)
+    friction: float = key(0.1, "Coulomb friction between grain and specimen", ge=0, le=2)
+    depth: Length = key("2 um", "depth of indentation below the first surface, held while sliding", gt=0)
+    start: Length = key("50 um", "position of the indentation along the specimen", gt=0)
+    path: Length = key("60 um", "sliding distance; 0 um only indents (H slides 100 um)", ge=0)
+
+
+class Damage(Model):
+    """Limits of ERVE damage in the run; takes a material with law "erve"."""
+
+    growth_per_joule: float = key(
+        3e5,
+        "alpha of H (6.98): largest growth of damage per joule of work of the tip on the whole specimen. H prints 0.05 "
+        "with units that change; too small does nothing, too large deletes the track: a study, not a constant",
+        gt=0,
+    )
+    remove_at: float = key(0.95, "elements whose damage 1 - f reaches this are removed", gt=0, lt=1)
+
+
+class Numerics(Model):
+    """What trades accuracy for time. Speeds are top speeds as shares of the longitudinal wave speed."""
+
+    points: Literal[1, 8] = key(
+        1, "integration points: 1 with hourglass control, or 8 with mean dilatation (reference)"
+    )
+    indent_speed: float = key(0.003, "indentation; faster makes the tip bounce", gt=0, le=0.1)
+    slide_speed: float = key(0.02, "sliding", gt=0, le=0.1)
+    lift_speed: float = key(0.006, "lifting", gt=0, le=0.1)
+    draft_speed_factor: float = key(2.0, "speeds are multiplied by this at draft fidelity", ge=1, le=10)
+    reference_speed_factor: float = key(0.5, "speeds are multiplied by this at reference fidelity", gt=0, le=1)
+    safety: float = key(0.8, "step over volume / largest face / wave speed", gt=0, le=1)
+    floor: float = key(0.3, "share of the first step below which an element gets mass instead", gt=0, le=1)
+    mass_cap: float = key(0.05, "the run stops when added mass exceeds this share of the specimen's", ge=0)
+    refresh: int = key(25, "steps between refreshes of the step, of removal and of the history", ge=1, le=500)
+    hourglass: float = key(0.02, "hourglass stiffness over the elastic bending stiffness", ge=0, le=1)
+    viscosity: float = key(0.06, "linear bulk viscosity, share of the critical one", ge=0, le=0.5)
+    penalty: float = key(0.5, "contact stiffness over E A / h of the surface element", gt=0, le=5)
+    energy_limit: float = key(0.03, "the run stops at this energy error, share of the external work", gt=0, le=1)
+    volume_limit: float = key(0.02, "without damage, the run stops when det F leaves 1 by this", gt=0, le=0.5)
+
+
+class Output(Model):
+    """What is saved."""
+
+    frames: int = key(4, "states saved while sliding, besides the ends of the phases", ge=0, le=1000)
+    sections: int = key(61, "sections across the track, from one end of the fine range to the other", ge=3, le=2000)
+    points: int = key(181, "points per section", ge=11, le=5000)
+
+
+class ScratchScene(Scene):
+    """A rigid grain indents a specimen, slides and lifts; the groove is measured."""
+
+    kind: Literal["scratch"]
+    specimen: Specimen = key(Specimen(), "the specimen")
+    mesh: Mesh = key(Mesh(), "the mesh")
+    tip: Tip = key(Tip(), "the grain and its path")
+    material: MaterialTable = key(
+        _ST52, "constitutive law; the default table approximates St-52 (S355), of which H prints a figure only"
+    )
+    damage: Damage | None = key(None, 'rate limit and removal of damaged material, with law "erve"')
+    numerics: Numerics = key(Numerics(), "accuracy against time")
+    output: Output = key(Output(), "what is saved")
+
+    @property
+    def contact_half_width(self) -> float:
+        """a = sqrt(2 R d) [m]."""
+        return math.sqrt(2.0 * self.tip.radius * self.tip.depth)
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        a = self.contact_half_width
+        wrong = []
+        if self.tip.depth >= 0.5 * min(self.specimen.thickness, self.tip.radius):
+            wrong.append("tip.depth below half of specimen.thickness and of tip.radius")
+        if 1.2 * a > 0.5 * self.specimen.width:
+            wrong.append(f"specimen.width of at least 2.4 contact half-widths ({2.4e6 * a:.3g} um)")
+        if self.tip.start < a or self.tip.start + self.tip.path + a > self.specimen.length:
+            wrong.append(f"a path that stays a contact half-width ({1e6 * a:.3g} um) inside specimen.length")
+        if self.mesh.size * self.mesh.draft_factor > a and self.fidelity == "draft" or self.mesh.size > a:
+            wrong.append(f"mesh.size below the contact half-width ({1e6 * a:.3g} um)")
+        if self.damage is not None and self.material.law not in (None, "erve"):
+            wrong.append('material.law = "erve", because [damage] is given')
+        if wrong:
+            raise ValueError("; ".join(wrong))
+        return self

@@ -1,0 +1,176 @@
+"""scratch: a rigid grain indents a specimen, slides and lifts; the groove is measured along the way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from graben.mechanics.continuum.scratch import run as mechanics
+from graben.mechanics.continuum.scratch.mesh import HexMesh, specimen
+from graben.mechanics.failure import NumericsFailed
+from graben.mechanics.materials.law import Law
+from graben.mechanics.materials.laws import LAWS
+from graben.schemas.faults import BadInput, Fault
+from graben.schemas.files import refuse_existing
+from graben.schemas.scene import load_scene
+from graben.schemas.scenes.scratch import ScratchScene
+from graben.stages.material import pack_material
+from graben.stages.record import Progress, Record, silent
+from graben.stages.scratch_output import measure_groove, write_last_good, write_run
+
+# Laws whose strain increments may add up to plastic strains of order 1 under the tip.
+_TAKES = ("elastic", "j2", "erve", "drucker-prager")
+
+
+def run(
+    scene_path: Path,
+    output: Path,
+    *,
+    material: Path | None = None,
+    overrides: Iterable[str] = (),
+    overwrite: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Run a scratch scene; write its artifact, and VTU files with a PVD beside it.
+
+    Parameters
+    ----------
+    material : a file with law and parameters that replaces the scene's
+
+    Returns
+    -------
+    headline numbers: groove_area_m2, shoulder_area_m2, degree_of_wear (after lifting, at s_over_a),
+    degree_of_wear_loaded, degree_of_wear_by_s_over_a, degree_of_penetration, normal_force_n, tangential_force_n,
+    energy_error, elements, steps
+
+    Raises
+    ------
+    BadInput : the scene or the material has faults, or the output exists
+    NumericsFailed : energy, volume or mass error beyond the scene's limits; the last good state is kept as VTU
+    """
+    scene: ScratchScene = load_scene(scene_path, "scratch", overrides)
+    refuse_existing(output, overwrite)
+    source = material if material is not None else scene.material.file
+    law, par, _ = pack_material(material if material is not None else scene.material, scene_path)
+    _check_law(scene, law, str(source or scene_path))
+    record = Record.begin(scene, [] if source is None else [source])
+    mesh = mesh_of(scene)
+    progress(0.0, f"{len(mesh.cells)} elements")
+    try:
+        result = mechanics.simulate(
+            mesh,
+            law.id,
+            par,
+            law.initial_state(par),
+            scene.specimen.density,
+            mechanics.Tip(scene.tip.radius, scene.tip.friction, scene.tip.start, scene.tip.depth, scene.tip.path),
+            numerics_of(scene),
+            _damage(scene, law),
+            scene.output.frames,
+            progress,
+            _slots(law),
+        )
+    except mechanics.ScratchFailed as failure:
+        kept = write_last_good(output, mesh, failure.last_good)
+        raise NumericsFailed(
+            failure.what,
+            where=failure.where,
+            step=failure.step,
+            advice=f"{failure.advice}; the last good state is in {kept}",
+        ) from None
+    progress(0.99, "sections")
+    groove = measure_groove(scene, mesh, result)
+    headline = {**groove.headline, **_cost(result)}
+    record.cost.update(result.cost)
+    record.cost.update({k: headline[k] for k in ("energy_error", "hourglass_share", "kinetic_share_sliding")})
+    record.cost["mesh_size_m"] = mesh_size(scene)
+    write_run(output, record, scene, mesh, result, groove)
+    progress(1.0, "done")
+    return headline
+
+
+def mesh_size(scene: ScratchScene) -> float:
+    """Edge under the path [m] at the scene's fidelity."""
+    factor = {"draft": scene.mesh.draft_factor, "standard": 1.0, "reference": scene.mesh.reference_factor}
+    return scene.mesh.size * factor[scene.fidelity]
+
+
+def mesh_of(scene: ScratchScene) -> HexMesh:
+    """The half specimen's mesh at the scene's fidelity."""
+    s, t = scene.specimen, scene.tip
+    return specimen(
+        s.length,
+        0.5 * s.width,
+        s.thickness,
+        t.start,
+        t.path,
+        scene.contact_half_width,
+        mesh_size(scene),
+        scene.mesh.growth,
+        scene.mesh.growth_depth,
+    )
+
+
+def numerics_of(scene: ScratchScene) -> mechanics.Numerics:
+    """The run's numerics at the scene's fidelity."""
+    n = scene.numerics
+    factor = {"draft": n.draft_speed_factor, "standard": 1.0, "reference": n.reference_speed_factor}[scene.fidelity]
+    return mechanics.Numerics(
+        points=n.points,
+        indent_speed=factor * n.indent_speed,
+        slide_speed=factor * n.slide_speed,
+        lift_speed=factor * n.lift_speed,
+        safety=n.safety,
+        floor=n.floor,
+        mass_cap=n.mass_cap,
+        refresh=n.refresh,
+        hourglass=n.hourglass,
+        viscosity=n.viscosity,
+        penalty=n.penalty,
+        volume_limit=n.volume_limit,
+        energy_limit=n.energy_limit,
+    )
+
+
+def _check_law(scene: ScratchScene, law: Law, file: str) -> None:
+    if law.name not in _TAKES:
+        raise BadInput(Fault(file, "law", repr(law.name), "one of " + ", ".join(n for n in _TAKES if n in LAWS)))
+    if scene.damage is not None and law.name != "erve":
+        raise BadInput(Fault(file, "law", repr(law.name), "'erve', because the scene has [damage]"))
+
+
+def _slots(law: Law) -> tuple[int, int]:
+    """Slots of equivalent plastic strain and damage in the law's state, -1 where it has none."""
+    names = law.state_names
+    plastic = "equivalent_plastic_strain"
+    return (
+        names.index(plastic) if plastic in names else -1,
+        names.index("damage") if "damage" in names and law.name != "elastic" else -1,
+    )
+
+
+def _damage(scene: ScratchScene, law: Law) -> mechanics.Damage | None:
+    if scene.damage is None:
+        return None
+    return mechanics.Damage(scene.damage.growth_per_joule, scene.damage.remove_at, law.index("max_damage_step"))
+
+
+def _cost(result: mechanics.ScratchRun) -> dict[str, Any]:
+    external = float(result.energy["external"].max())
+    phases = list(result.phases)
+    moving = result.phase == (phases.index("slide") if "slide" in phases else phases.index("indent"))
+    internal = np.maximum(result.energy["internal"], 1e-300)
+    share = (result.energy["kinetic"] / internal)[moving]
+    return {
+        "energy_error": float(result.error[result.energy["external"] > 0.1 * external].max()),
+        "hourglass_share": float(result.energy["hourglass"][-1] / result.energy["internal"][-1]),
+        "kinetic_share_sliding": float(np.median(share)),
+        "volume_ratio_min": result.cost["volume_ratio_min"],
+        "volume_ratio_max": result.cost["volume_ratio_max"],
+        "removed_elements": int(result.cost["removed_elements"]),
+        "elements": int(result.cost["elements"]),
+        "steps": int(result.cost["steps"]),
+    }
