@@ -208,6 +208,13 @@ class Assembly:
         self.law = law
         self.dt = self.safety * critical_step(law)
 
+    def shorten_step(self, factor: float) -> None:
+        """Multiply the time step by a factor below 1."""
+        if not 0.0 < factor < 1.0:
+            raise ValueError(f"factor: expected a value between 0 and 1, found {factor}")
+        self._close_ledger()
+        self.dt *= factor
+
     # ---- drives ----
 
     def shake_floor(self, amplitude: float, frequency: float) -> None:

@@ -115,16 +115,19 @@ def rub(nx, ny, nz, px, py, pz, sx, sy, sz, kt, ct, limit, dt):
         sx *= scale
         sy *= scale
         sz *= scale
+    ox, oy, oz = sx, sy, sz
     sx += kt * px * dt
     sy += kt * py * dt
     sz += kt * pz * dt
     size = np.sqrt(sx * sx + sy * sy + sz * sz)
     if size > limit:
         scale = limit / size
-        lost = 0.5 * (size * size - limit * limit) / kt
         sx *= scale
         sy *= scale
         sz *= scale
+        # work of the leapfrog (mean of old and new force) less what the spring kept
+        work = 0.5 * ((ox + sx) * px + (oy + sy) * py + (oz + sz) * pz) * dt
+        lost = work - 0.5 * (limit * limit - before * before) / kt
         return sx, sy, sz, sx, sy, sz, lost
     tx, ty, tz = sx + ct * px, sy + ct * py, sz + ct * pz
     total = np.sqrt(tx * tx + ty * ty + tz * tz)

@@ -9,6 +9,18 @@ from graben.mechanics.particles.motion import FLOOR, PISTON
 
 
 @kernel
+def largest_eigenvalue(k):
+    """Of a symmetric 3 x 3 matrix (xx, yy, zz, xy, yz, zx), by the trigonometric formula."""
+    mean = (k[0] + k[1] + k[2]) / 3.0
+    a, b, c, d, e, f = k[0] - mean, k[1] - mean, k[2] - mean, k[3], k[4], k[5]
+    p = np.sqrt((a * a + b * b + c * c + 2.0 * (d * d + e * e + f * f)) / 6.0)
+    if p == 0.0:
+        return mean
+    half_det = 0.5 * (a * (b * c - e * e) - d * (d * c - e * f) + f * (d * e - b * f)) / (p * p * p)
+    return mean + 2.0 * p * np.cos(np.arccos(min(1.0, max(-1.0, half_det))) / 3.0)
+
+
+@kernel
 def survey(
     x,
     v,
@@ -38,7 +50,7 @@ def survey(
     """Sums over all contacts of the present state, springs only.
 
     Fills floor_force (n,), coordination (n,) with the contacts of each particle (walls included) and stiffness (n,)
-    with the largest row sum of the 3 x 3 stiffness that its contacts give it, N/m.
+    with the largest eigenvalue of the 3 x 3 stiffness that its contacts give it, N/m.
     Returns an array: kinetic, spinning, elastic, potential energy (J), mean contact force, mean net force (N),
     number of contacts, largest overlap over radius, pushes on floor and piston (N).
     """
@@ -112,8 +124,7 @@ def survey(
                     rows[p, 4] += scale * g1 * g2
                     rows[p, 5] += scale * g2 * g0
     for i in range(n):
-        a, b, c = abs(rows[i, 3]), abs(rows[i, 4]), abs(rows[i, 5])
-        stiffness[i] = max(rows[i, 0] + a + c, rows[i, 1] + a + b, rows[i, 2] + b + c)
+        stiffness[i] = largest_eigenvalue(rows[i])
     out = np.empty(10)
     out[0], out[1], out[2], out[3] = kinetic, spinning, elastic, potential
     out[4] = force_sum / max(contacts, 1)
