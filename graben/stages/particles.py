@@ -17,8 +17,8 @@ from graben.schemas.scenes.particles import ParticlesScene
 from graben.schemas.vtk import VtuSeries
 from graben.stages.record import Progress, Record, silent
 
-# (time step over critical, unbalanced force ratio); their measured trade is in docs/dem-run-particles.md
-FIDELITY = {"draft": (0.6, 5e-3), "standard": (0.4, 1e-3), "reference": (0.2, 1e-4)}
+# (time step over critical, kinetic energy at rest, unbalanced force ratio): docs/dem-run-particles.md has the trade
+FIDELITY = {"draft": (0.6, 1e-2, 5e-3), "standard": (0.4, 1e-3, 1e-3), "reference": (0.2, 1e-4, 1e-4)}
 
 
 def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> dict[str, Any]:
@@ -36,12 +36,7 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
     record = Record.begin(scene)
     try:
         law, recipe = _law(scene), _recipe(scene)
-        beds = [
-            make_bed(
-                law, recipe, scene.seed + b, lambda f, m, b=b: progress((b + f) / scene.beds, f"bed {b + 1}: {m}")
-            )
-            for b in range(scene.beds)
-        ]
+        beds = [make_bed(law, recipe, scene.seed + b, _part(progress, b, scene.beds)) for b in range(scene.beds)]
     except ValueError as error:
         raise BadInput(Fault(str(scene.source.path), "", "", f"a scene that can be run ({error})")) from error
 
@@ -79,6 +74,15 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
     }
 
 
+def _part(progress: Progress, bed: int, beds: int) -> Progress:
+    """Progress of one bed among several."""
+
+    def tell(fraction: float, message: str) -> None:
+        progress((bed + fraction) / beds, f"bed {bed + 1} of {beds}: {message}")
+
+    return tell
+
+
 def _law(scene: ParticlesScene) -> LinearLaw:
     c = scene.contact
     diameter = np.array([g.diameter for g in scene.grains])
@@ -100,7 +104,7 @@ def _law(scene: ParticlesScene) -> LinearLaw:
 
 
 def _recipe(scene: ParticlesScene) -> BedRecipe:
-    safety, balance = FIDELITY[scene.fidelity]
+    safety, rest, balance = FIDELITY[scene.fidelity]
     numerics, loading = scene.numerics, scene.loading
     smallest = min(g.diameter for g in scene.grains)
     shakes, amplitude, frequency = 0, 0.0, 0.0
@@ -120,6 +124,7 @@ def _recipe(scene: ParticlesScene) -> BedRecipe:
         shake_amplitude=amplitude,
         shake_frequency=frequency,
         safety=numerics.safety or safety,
+        rest=numerics.rest or rest,
         balance=numerics.balance or balance,
         ramp=loading.ramp,
         energy_limit=numerics.energy_limit,

@@ -36,6 +36,7 @@ class BedRecipe:
     loose_fraction : solid fraction of the inserted column
     gravity : m/s2; pressure : Pa on top
     shakes : cycles of the floor, z = amplitude sin(2 pi frequency t), amplitude m, frequency Hz
+    rest : kinetic energy over (weight x smallest radius) at which a bed has settled
     balance : unbalanced force ratio at which the bed counts as quiet; energy_limit : allowed relative error of
         the energy balance
     """
@@ -51,6 +52,7 @@ class BedRecipe:
     shake_amplitude: float = 0.0
     shake_frequency: float = 0.0
     safety: float = 0.4
+    rest: float = 1e-3
     balance: float = 1e-3
     energy_limit: float = 0.05
     ramp: float = 5.0  # half periods of the slowest mode over which the pressure rises
@@ -189,7 +191,7 @@ def make_bed(
     run = _Run(law, recipe, seed, progress)
     box = run.box
     small = float(law.radius.min())
-    slow = 1e-4 * recipe.gravity * small  # kinetic energy per mass of a grain at rest
+    slow = recipe.rest * recipe.gravity * small  # kinetic energy per mass of a grain at rest
     mean_k = float(np.mean(np.diag(law.pair_kn)))
     weight = run.mass * recipe.gravity
 

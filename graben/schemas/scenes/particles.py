@@ -61,6 +61,9 @@ class Numerics(Model):
     """Knobs that trade accuracy for time; left out, fidelity sets them."""
 
     safety: float | None = key(None, "time step over the estimated critical one", gt=0, le=1)
+    rest: float | None = key(
+        None, "kinetic energy over weight times smallest radius at which a poured bed has settled", gt=0
+    )
     balance: float | None = key(None, "unbalanced force over mean contact force at which the bed is at rest", gt=0)
     loose_fraction: float = key(0.25, "solid fraction of the column that is poured", gt=0, le=0.35)
     energy_limit: float = key(0.05, "largest allowed error of the energy balance", gt=0)

@@ -40,10 +40,9 @@ def _slice(axes: Any, x: np.ndarray, r: np.ndarray, kind: np.ndarray, width: flo
     colours = [COLOURS[k % len(COLOURS)] for k in kind[cut]]
     _discs(axes, x[cut][:, [0, 2]], shown, colours, edgecolor="black", linewidth=0.3)
     axes.axhline(0.0, color="black", lw=2)
-    axes.axhline(top, color="firebrick", lw=1.5, label="piston")
+    axes.axhline(top, color="firebrick", lw=1.5)
     axes.set(xlim=(0, width), ylim=(-0.05 * top, 1.1 * top), xlabel="x, mm", ylabel="z, mm", aspect="equal")
-    axes.set_title("slice through the middle", fontsize=9)
-    axes.legend(fontsize=7, loc="upper right")
+    axes.set_title("slice through the middle, under the piston (red)", fontsize=9)
 
 
 def _floor(
@@ -89,11 +88,11 @@ def _history(push_axes: Any, energy_axes: Any, data: Any) -> None:
     count = push_axes.twinx()
     count.plot(time, data["floor_contacts"].values[own], color="gray", lw=0.8)
     count.set_ylabel("floor contacts", color="gray")
-    push_axes.legend(fontsize=7)
+    push_axes.legend(fontsize=7, loc="center right")
     push_axes.set_title("forces and floor contacts", fontsize=9)
     for name, colour in (("potential", 0), ("dashpots", 1), ("piston_work", 2), ("elastic", 3), ("kinetic", 4)):
         energy_axes.plot(time, data[name].values[own], label=name.replace("_", " "), color=COLOURS[colour], lw=1)
     energy_axes.plot(time, data["total"].values[own], "k--", lw=1, label="total")
     energy_axes.set(xlabel="time, ms", ylabel="energy, J")
-    energy_axes.legend(fontsize=7)
+    energy_axes.legend(fontsize=7, loc="center right")
     energy_axes.set_title("energy balance", fontsize=9)

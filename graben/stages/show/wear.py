@@ -25,7 +25,7 @@ def draw(dataset: Any, figure: Any) -> None:
             f"{total:.3g}", (max(total, 0.0), y), (4, 0), textcoords="offset points", va="center", fontsize=8
         )
     rates.set_yticks(place, names, fontsize=8)
-    rates.margins(x=0.12)
+    rates.set_xlim(min(0.0, 1.15 * left.min()), 1.15 * max(left.max(), 1e-300))
     rates.set(xlabel="wear rate, m$^3$/s")
     rates.legend(fontsize=8, loc="lower right")
     rates.set_title(f"load {dataset.attrs.get('load_mode', '')}", fontsize=9)
@@ -36,5 +36,5 @@ def draw(dataset: Any, figure: Any) -> None:
     load.axvline(1.0, color="black", lw=1)
     load.set_xscale("log")
     load.set_xlim(min(0.5, ratio.min() / 2), max(2.0, ratio.max() * 3))
-    load.set_xlabel(f"carried over applied load ({applied:.4g} N)")
+    load.set_xlabel(f"carried load / {applied:.4g} N")
     load.set_title("do the contacts carry the load?", fontsize=9)
