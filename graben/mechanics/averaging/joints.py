@@ -64,8 +64,20 @@ def joint_statistics(
         slip_mean=share * per_state(state, length * slip, count),
         slip_rms=np.sqrt(share * per_state(state, length * slip**2, count)),
         slip_max=largest,
-        coordination=2.0 * per_state(state, closed.astype(np.float64), count) / max(int(inside.sum()), 1),
+        coordination=2.0
+        * _neighbour_pairs(state[closed], contact_block[within][closed], count)
+        / max(int(inside.sum()), 1),
     )
+
+
+def _neighbour_pairs(state: Ints, block: Ints, count: int) -> Floats:
+    """(time,) pairs of blocks that touch, however many contacts each pair has."""
+    if state.size == 0:
+        return np.zeros(count)
+    low, high = block.min(axis=1), block.max(axis=1)
+    size = np.int64(block.max()) + 1
+    distinct = np.unique((state * size + low) * size + high)
+    return np.bincount(distinct // (size * size), minlength=count).astype(np.float64)
 
 
 def fabric(network: Network, inside: Flags, position: Floats) -> Floats:

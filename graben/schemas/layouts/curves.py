@@ -32,7 +32,10 @@ LAYOUT = Layout(
         "strain": Variable(_TENSOR, "1", "average strain since the first state, extension positive", may_be_nan=True),
         "confining_stress": Variable(_PATH, "Pa", "lateral stress of the test, tension positive", may_be_nan=True),
         "area": Variable(
-            _PATH, "m2", "area inside the outline at the first state (spheres: volume in m3, see `measure`)", optional=True
+            _PATH,
+            "m2",
+            "area inside the outline at the first state (spheres: volume in m3, see `measure`)",
+            optional=True,
         ),
         "centre": Variable(("path", "axis"), "m", "centre of the REV (z is 0 in the plane)", optional=True),
         "radius": Variable(
@@ -67,8 +70,12 @@ LAYOUT = Layout(
         "joint_slip_max": _step("m", "largest joint slip"),
         "joint_slipping_fraction": _step("1", "part of the joint length that is slipping or broken"),
         "fabric": Variable(
-            _TENSOR, "1", "length-weighted fabric tensor n n of the contacts (trace 1)", optional=True, may_be_nan=True
+            _TENSOR,
+            "1",
+            "length-weighted fabric tensor n n of the contacts (trace 1)",
+            optional=True,
+            may_be_nan=True,
         ),
-        "coordination": _step("1", "contacts per block"),
+        "coordination": _step("1", "neighbours that a block touches, inside the outline"),
     },
 )

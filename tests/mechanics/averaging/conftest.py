@@ -1,18 +1,25 @@
 """The block models of the tests."""
 
 import importlib.util
+import sys
 from pathlib import Path
 
 import pytest
 
-_SPEC = importlib.util.spec_from_file_location("synthetic_blocks", Path(__file__).with_name("synthetic.py"))
-_MODULE = importlib.util.module_from_spec(_SPEC)
-import sys  # noqa: E402
 
-sys.modules["synthetic_blocks"] = _MODULE
-_SPEC.loader.exec_module(_MODULE)
+def _load(name):
+    spec = importlib.util.spec_from_file_location(f"averaging_{name}", Path(__file__).with_name(f"{name}.py"))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.fixture(scope="session")
 def synthetic():
-    return _MODULE
+    return _load("synthetic")
+
+
+@pytest.fixture(scope="session")
+def elastic():
+    return _load("elastic")

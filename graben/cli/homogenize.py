@@ -1,0 +1,72 @@
+"""homogenize: average a run of blocks over a representative area."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from graben.cli.options import FILE, Session, Tool, stage_options
+
+
+def _length(text: str, option: str) -> float:
+    from graben.schemas.faults import BadInput, Fault
+    from graben.schemas.quantities import to_si
+
+    try:
+        return to_si(text.strip(), "m")
+    except ValueError as error:
+        raise BadInput(Fault("homogenize", option, repr(text), str(error))) from error
+
+
+def _point(text: str, option: str) -> tuple[float, float]:
+    from graben.schemas.faults import BadInput, Fault
+
+    parts = text.split(",")
+    if len(parts) != 2:
+        raise BadInput(Fault("homogenize", option, repr(text), 'two lengths, such as "5 m, 5 m"'))
+    return _length(parts[0], option), _length(parts[1], option)
+
+
+@click.command("homogenize", cls=Tool)
+@click.argument("inputs", nargs=-1, required=True, type=FILE, metavar="DEM.nc...")
+@click.option("--radius", "radii", multiple=True, metavar="LENGTH", help='Radius of the REV, "4 m" (repeatable).')
+@click.option("--centre", metavar="X,Y", help='Its centre, "5 m, 5 m"; the middle of the model unless given.')
+@click.option("--polygon", metavar="X,Y;...", help='A polygon instead: "1 m,1 m; 9 m,1 m; 9 m,9 m".')
+@click.option("--deformed", is_flag=True, help="Measure area and strain in the outline's current shape.")
+@click.option("--chosen-at", type=int, default=0, help="Saved state at which blocks meet the REV (0: the first).")
+@click.option("--steps", "steps_picture", type=FILE, help="Also draw how the outline was found (.png, .pdf, .svg).")
+@stage_options
+def main(
+    session: Session,
+    inputs: tuple[Path, ...],
+    radii: tuple[str, ...],
+    centre: str | None,
+    polygon: str | None,
+    deformed: bool,
+    chosen_at: int,
+    steps_picture: Path | None,
+    output: Path,
+    overwrite: bool,
+) -> None:
+    """Average stress and strain of runs of blocks over representative areas.
+
+    Several inputs, or radii, become several paths of one artifact of curves, in the order given.
+    """
+    from graben.stages import homogenize
+
+    corners = [_point(p, "--polygon") for p in polygon.split(";") if p.strip()] if polygon else []
+    with session.progress() as progress:
+        headline = homogenize.run(
+            inputs,
+            output,
+            radii=[_length(r, "--radius") for r in radii],
+            centre=_point(centre, "--centre") if centre else None,
+            polygon=corners,
+            deformed=deformed,
+            chosen_at=chosen_at,
+            steps_picture=steps_picture,
+            overwrite=overwrite,
+            progress=progress,
+        )
+    session.report(headline)

@@ -1,0 +1,53 @@
+"""rev-study: how large must the representative area be?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from graben.cli.options import FILE, Session, Tool, set_option, stage_options
+
+
+@click.command("rev-study", cls=Tool)
+@click.argument("inputs", nargs=-1, required=True, type=FILE, metavar="DEM.nc...")
+@click.option(
+    "--scene", type=FILE, help='Scene of kind "rev-study"; its defaults unless given (graben scene rev-study).'
+)
+@click.option(
+    "--radius", "radii", multiple=True, metavar="LENGTH", help="Radius to try (repeatable; in rising order)."
+)
+@click.option("--grid", type=int, help="Centres per side of a square grid.")
+@click.option("--processes", type=int, help="Processes that share the work (0: one per core).")
+@set_option
+@stage_options
+def main(
+    session: Session,
+    inputs: tuple[Path, ...],
+    scene: Path | None,
+    radii: tuple[str, ...],
+    grid: int | None,
+    processes: int | None,
+    overrides: tuple[str, ...],
+    output: Path,
+    overwrite: bool,
+) -> None:
+    """Average runs of blocks over many radii and places, and recommend a radius.
+
+    Several inputs are realizations: the same model from other seeds, at the same lateral stress.
+    """
+    from graben.schemas.scene import load_scene
+    from graben.stages import rev_study
+    from graben.stages.default_scene import default_scene
+
+    short = list(overrides)
+    if radii:
+        short.append("samples.radii=[" + ", ".join(f'"{r}"' for r in radii) + "]")
+    if grid is not None:
+        short.append(f"samples.grid={grid}")
+    if processes is not None:
+        short.append(f"processes={processes}")
+    study = load_scene(scene, "rev-study", short) if scene else default_scene("rev-study", short)
+    with session.progress() as progress:
+        headline = rev_study.run(inputs, study, output, overwrite=overwrite, progress=progress)
+    session.report(headline)

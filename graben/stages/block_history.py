@@ -1,0 +1,120 @@
+"""A run of blocks, as averaging wants it: read from an artifact of kind "blocks"."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray
+
+from graben.mechanics.averaging.history import Contacts, History
+from graben.mechanics.averaging.rev import Circle, Rev
+from graben.schemas.artifact import read_artifact
+from graben.schemas.faults import BadInput, Fault
+
+
+@dataclass(frozen=True)
+class Run:
+    """One artifact of blocks: its file, its arrays, and its lateral stress (Pa, compression negative)."""
+
+    path: Path
+    history: History
+    confining_stress: float
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Centre of the model's bounding box, m."""
+        low, high = self.history.domain.min(axis=0), self.history.domain.max(axis=0)
+        return float(low[0] + high[0]) / 2.0, float(low[1] + high[1]) / 2.0
+
+    def refuse_outside(self, rev: Rev, key: str) -> list[Fault]:
+        """A fault where a region reaches beyond the model's outline (by more than a thousandth of its radius)."""
+        beyond = rev.outside_by(self.history.domain)
+        if beyond <= 1e-3 * rev.radius:
+            return []
+        shape = "circle" if isinstance(rev, Circle) else "polygon"
+        x, y = rev.centre
+        low, high = self.history.domain.min(axis=0), self.history.domain.max(axis=0)
+        value = f"{shape} of radius {rev.radius:g} m at ({x:g}, {y:g}) m"
+        expected = (
+            f"a REV inside the model, which spans {low[0]:g} to {high[0]:g} m by {low[1]:g} to {high[1]:g} m; "
+            f"it reaches {beyond:g} m beyond"
+        )
+        return [Fault(str(self.path), key, value, expected)]
+
+
+def read_run(path: Path) -> Run:
+    """Read and check one artifact.
+
+    Raises
+    ------
+    BadInput : not a whole artifact of blocks, or its indices do not fit together
+    """
+    data = read_artifact(path, "blocks")
+    faults = _index_faults(path, data)
+    if faults:
+        raise BadInput(faults)
+    count = np.asarray(data["contact_count"].values, dtype=np.int64)
+    history = History(
+        time=_floats(data, "time"),
+        position=_floats(data, "vertex_position"),
+        displacement=_floats(data, "displacement"),
+        vertex_block=_ints(data, "vertex_block"),
+        zone_vertex=_ints(data, "zone_vertex"),
+        zone_block=_ints(data, "zone_block"),
+        corner_count=_ints(data, "block_corner_count"),
+        corner=_ints(data, "block_corner"),
+        zone_stress=_floats(data, "zone_stress"),
+        contacts=Contacts(
+            state=np.repeat(np.arange(count.size), count),
+            block=_ints(data, "contact_block"),
+            position=_floats(data, "contact_position"),
+            force=_floats(data, "contact_force"),
+            length=_floats(data, "contact_length"),
+            slip=_floats(data, "contact_slip"),
+            flag=_ints(data, "contact_state"),
+        ),
+        vertex_force=_floats(data, "boundary_force"),
+    )
+    try:
+        _ = history.network
+    except ValueError as error:
+        raise BadInput(Fault(str(path), "zone_vertex", "", f"blocks with closed outlines ({error})")) from error
+    return Run(path, history, float(data["confining_stress"]))
+
+
+def _floats(data: xarray.Dataset, name: str) -> np.ndarray:
+    return np.ascontiguousarray(data[name].values, dtype=np.float64)
+
+
+def _ints(data: xarray.Dataset, name: str) -> np.ndarray:
+    return np.ascontiguousarray(data[name].values, dtype=np.int64)
+
+
+def _index_faults(path: Path, data: xarray.Dataset) -> list[Fault]:
+    """Indices that point outside their arrays; counts that do not add up."""
+    faults = []
+    sizes = {name: data.sizes.get(name, 0) for name in ("time", "vertex", "block", "corner", "contact")}
+    for name in ("time", "vertex", "block"):
+        if sizes[name] == 0:
+            faults.append(Fault(str(path), f"dim {name}", "0", "at least one"))
+    for name, dim in (
+        ("vertex_block", "block"),
+        ("zone_vertex", "vertex"),
+        ("zone_block", "block"),
+        ("block_corner", "vertex"),
+        ("contact_block", "block"),
+    ):
+        values = data[name].values
+        if values.size and (values.min() < 0 or values.max() >= sizes[dim]):
+            span = f"{values.min()} to {values.max()}"
+            faults.append(Fault(str(path), name, span, f"indices from 0 to {sizes[dim] - 1}"))
+    for name, dim in (("contact_count", "contact"), ("block_corner_count", "corner")):
+        total = int(data[name].values.sum())
+        if total != sizes[dim]:
+            faults.append(Fault(str(path), name, f"sum {total}", f"a sum of {sizes[dim]}, the length of dim {dim}"))
+    time = data["time"].values
+    if time.size > 1 and not (np.diff(time) > 0).all():
+        faults.append(Fault(str(path), "time", "", "rising values"))
+    return faults

@@ -1,0 +1,191 @@
+"""homogenize: average stress and strain of runs of blocks over REVs, as curves over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from graben.mechanics.averaging.history import Average, average
+from graben.mechanics.averaging.rev import Circle, Polygon, Rev
+from graben.schemas.artifact import write_artifact
+from graben.schemas.faults import BadInput, Fault
+from graben.schemas.files import refuse_existing
+from graben.schemas.layouts.curves import LAYOUT
+from graben.stages.block_history import Run, read_run
+from graben.stages.record import Progress, Record, silent
+
+Point = tuple[float, float]
+
+_TENSORS = ("stress", "strain", "stress_boundary", "strain_blocks", "strain_joints", "fabric")
+_SCALARS = (
+    "rotation",
+    "current_area",
+    "solid_fraction",
+    "force_imbalance",
+    "moment_imbalance",
+    "hill_mandel_residual",
+    "hill_mandel_work",
+    "joint_length",
+    "joint_open_fraction",
+    "joint_slipping_fraction",
+    "joint_slip_mean",
+    "joint_slip_rms",
+    "joint_slip_max",
+    "coordination",
+)
+
+
+def run(
+    inputs: Sequence[Path],
+    output: Path,
+    *,
+    radii: Sequence[float] = (),
+    centre: Point | None = None,
+    polygon: Sequence[Point] = (),
+    deformed: bool = False,
+    chosen_at: int = 0,
+    steps_picture: Path | None = None,
+    overwrite: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Average each run over each REV; one path per pair, run by run.
+
+    Parameters
+    ----------
+    inputs : artifacts of kind "blocks"
+    output : artifact of kind "curves"
+    radii : m, of circles; or `polygon`, corners in m
+    centre : m, of the circles; the middle of each model unless given
+    deformed : measure area and strain in the current shape of the outline
+    chosen_at : saved state at which blocks are said to meet the REV (0: the first)
+    steps_picture : also draw the nine steps of Y 2.3 for the first path
+
+    Returns
+    -------
+    headline numbers per path: area_m2, peak_stress_pa (largest compression, yy), strain_at_peak, and checks
+
+    Raises
+    ------
+    BadInput : faults of the inputs, a REV outside the model, an output that exists
+    """
+    if bool(radii) == bool(polygon):
+        raise BadInput(Fault("homogenize", "--radius, --polygon", "", "either a radius or a polygon"))
+    for target in (output, steps_picture):
+        if target is not None:
+            refuse_existing(target, overwrite)
+    record = Record.begin(None, inputs=_existing(inputs))
+    jobs, faults = _jobs(inputs, radii, centre, polygon, chosen_at, progress)
+    if faults:
+        raise BadInput(faults)
+    averages: list[Average] = []
+    for k, (source, rev) in enumerate(jobs):
+        progress(0.2 + 0.8 * k / len(jobs), f"averaging {source.path.name} over {rev.radius:g} m")
+        averages.append(average(source.history, rev, deformed, chosen_at))
+    arrays = curve_arrays(jobs, averages)
+    record.cost |= {
+        "zones": sum(int(a.outline.blocks[j[0].history.zone_block].sum()) for j, a in zip(jobs, averages)),
+        "states": int(max(a.stress.shape[0] for a in averages)),
+        "strain_closure": max(a.strain_closure for a in averages),
+        "force_imbalance": max(float(a.force_imbalance.max()) for a in averages),
+        "boundary_stress_difference": max(_boundary_difference(a) for a in averages),
+    }
+    attributes = {"configuration": "deformed" if deformed else "reference", "outline_chosen_at": chosen_at}
+    write_artifact(output, LAYOUT, arrays, record, attributes)
+    if steps_picture is not None:
+        from graben.stages.show.outline_steps import save_steps
+
+        save_steps(steps_picture, jobs[0][0].history, averages[0].outline, jobs[0][1])
+    return {"paths": [_headline(str(arrays["path_name"][k]), j, a) for k, (j, a) in enumerate(zip(jobs, averages))]}
+
+
+def _existing(inputs: Sequence[Path]) -> list[Path]:
+    missing = [Fault(str(p), "", "", "an existing artifact file") for p in inputs if not p.is_file()]
+    if missing:
+        raise BadInput(missing)
+    return list(inputs)
+
+
+def _jobs(
+    inputs: Sequence[Path],
+    radii: Sequence[float],
+    centre: Point | None,
+    polygon: Sequence[Point],
+    chosen_at: int,
+    progress: Progress,
+) -> tuple[list[tuple[Run, Rev]], list[Fault]]:
+    """Runs and regions, and every fault of any of them."""
+    jobs: list[tuple[Run, Rev]] = []
+    faults: list[Fault] = []
+    for k, path in enumerate(inputs):
+        progress(0.2 * k / len(inputs), f"reading {path.name}")
+        try:
+            source = read_run(path)
+        except BadInput as error:
+            faults += error.faults
+            continue
+        states = source.history.time.size
+        if not 0 <= chosen_at < states:
+            faults.append(Fault(str(path), "--chosen-at", str(chosen_at), f"a saved state, 0 to {states - 1}"))
+        try:
+            revs: list[Rev] = [Circle(centre or source.middle, r) for r in radii]
+            if polygon:
+                revs.append(Polygon(tuple(polygon)))
+        except ValueError as error:
+            return [], [Fault("homogenize", "--radius" if radii else "--polygon", "", str(error))]
+        for rev in revs:
+            faults += source.refuse_outside(rev, "--radius" if radii else "--polygon")
+            jobs.append((source, rev))
+    return jobs, faults
+
+
+def curve_arrays(jobs: Sequence[tuple[Run, Rev]], averages: Sequence[Average]) -> dict[str, Any]:
+    """Arrays of the layout "curves", one path per average; short paths end in nan."""
+    steps = [a.stress.shape[0] for a in averages]
+    longest = max(steps)
+
+    def padded(parts: Sequence[np.ndarray]) -> np.ndarray:
+        whole = np.full((len(parts), longest, *parts[0].shape[1:]), np.nan)
+        for k, part in enumerate(parts):
+            whole[k, : part.shape[0]] = part
+        return whole
+
+    many = len({r.radius for _, r in jobs}) > 1
+    names = [f"{j.path.stem} r={r.radius:g} m" if many else j.path.stem for j, r in jobs]
+    arrays: dict[str, Any] = {
+        "path_name": np.array(names),
+        "step_count": np.array(steps),
+        "time": padded([j.history.time for j, _ in jobs]),
+        "confining_stress": np.array([j.confining_stress for j, _ in jobs]),
+        "area": np.array([a.area for a in averages]),
+        "centre": np.array([[*r.centre, 0.0] for _, r in jobs]),
+        "radius": np.array([r.radius for _, r in jobs]),
+        "block_count": np.array([a.outline.blocks.sum() for a in averages]),
+        "porosity": padded([1.0 - a.solid_fraction for a in averages]),
+    }
+    for name in (*_TENSORS, *_SCALARS):
+        arrays[name] = padded([getattr(a, name) for a in averages])
+    return arrays
+
+
+def _boundary_difference(a: Average) -> float:
+    """Largest difference between zone and boundary-force stress, over the largest stress."""
+    largest = float(np.abs(a.stress).max())
+    return float(np.abs(a.stress - a.stress_boundary).max()) / largest if largest > 0.0 else 0.0
+
+
+def _headline(name: str, job: tuple[Run, Rev], a: Average) -> dict[str, Any]:
+    peak = int(np.argmin(a.stress[:, 1]))
+    return {
+        "name": name,
+        "confining_stress_pa": job[0].confining_stress,
+        "area_m2": a.area,
+        "blocks": int(a.outline.blocks.sum()),
+        "peak_stress_pa": -float(a.stress[peak, 1]),
+        "strain_at_peak": -float(a.strain[peak, 1]),
+        "boundary_stress_difference": _boundary_difference(a),
+        "hill_mandel_work": float(a.hill_mandel_work[-1]),
+        "strain_closure": a.strain_closure,
+    }

@@ -1,0 +1,272 @@
+"""rev-study: averages of one or several runs by radius and place, their scatter, and the radius they recommend."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from graben.mechanics.averaging.history import average
+from graben.mechanics.averaging.measures import MEASURES, curve_measures
+from graben.mechanics.averaging.representative import (
+    Convergence,
+    Criteria,
+    convergence,
+    independent_samples,
+    recommend,
+)
+from graben.mechanics.averaging.rev import Circle
+from graben.schemas.artifact import write_artifact
+from graben.schemas.faults import BadInput, Fault
+from graben.schemas.files import refuse_existing
+from graben.schemas.layouts.rev_study import LAYOUT
+from graben.schemas.scenes.rev_study import RevStudyScene
+from graben.stages.block_history import Run, read_run
+from graben.stages.record import Progress, Record, silent
+
+RESAMPLES = {"draft": 500, "standard": 2000, "reference": 20_000}
+_ATTEMPTS = 3
+
+# One chunk of samples: the file, and its (radius, x, y); one result each: stress, strain, area, blocks.
+Chunk = tuple[Path, list[tuple[float, float, float]]]
+Sample = tuple[np.ndarray, np.ndarray, float, int]
+
+
+def run(
+    inputs: Sequence[Path],
+    scene: RevStudyScene,
+    output: Path,
+    *,
+    overwrite: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Average every run at every radius and centre; test which radius is large enough.
+
+    Returns
+    -------
+    headline numbers: recommended_radius_m (None: no radius can be recommended), reason, and per scalar its mean and
+    interval at the largest radius
+
+    Raises
+    ------
+    BadInput : faults of the inputs, a REV outside a model, runs at different lateral stress, an output that exists
+    """
+    refuse_existing(output, overwrite)
+    runs = _read(inputs, progress)
+    record = Record.begin(scene, inputs=inputs)
+    centres = _centres(runs, scene)
+    chunks = _chunks(runs, centres, scene)
+    samples = _sampled(chunks, scene.processes or os.cpu_count() or 1, progress)
+    arrays = _arrays(runs, centres, samples, scene)
+    criteria = Criteria(
+        scene.tests.confidence,
+        scene.tests.tolerance,
+        scene.tests.variation,
+        scene.tests.resamples or RESAMPLES[scene.fidelity],
+    )
+    radii = np.asarray(scene.samples.radii)
+    independent = independent_samples(centres[0], radii, len(runs))
+    by_name = _statistics(arrays, criteria, scene)
+    missing = [name for name in scene.curves.properties if name not in by_name]
+    if missing:
+        wanted = "a value in at least one sample of every radius (does the curve rise, and peak inside the run?)"
+        raise BadInput(
+            [Fault(", ".join(map(str, inputs)), f"curves.properties {name}", "none", wanted) for name in missing]
+        )
+    advice = recommend(radii, {name: by_name[name] for name in scene.curves.properties}, independent)
+    for name, c in by_name.items():
+        arrays |= {
+            f"{name}_count": c.count,
+            f"{name}_mean": c.mean,
+            f"{name}_deviation": c.deviation,
+            f"{name}_low": c.low,
+            f"{name}_high": c.high,
+            f"{name}_mean_p": c.mean_p,
+            f"{name}_variance_p": c.variance_p,
+            f"{name}_settled": c.settled,
+        }
+    arrays["independent_samples"] = independent
+    arrays["recommended_radius"] = advice.radius or 0.0
+    record.cost |= {"samples": int(arrays["area"].size), "processes": scene.processes or os.cpu_count() or 1}
+    attributes = {
+        "reason": advice.reason,
+        "chosen_properties": ", ".join(scene.curves.properties),
+        "confidence": criteria.confidence,
+        "tolerance": criteria.tolerance,
+        "variation": criteria.variation,
+        "bootstrap_over": "runs" if len(runs) >= 3 else "samples",
+    }
+    write_artifact(output, LAYOUT, arrays, record, attributes)
+    return {
+        "recommended_radius_m": advice.radius,
+        "reason": advice.reason,
+        "samples": int(arrays["area"].size),
+        "properties": [_row(name, c) for name, c in by_name.items()],
+    }
+
+
+def _row(name: str, c: Convergence) -> dict[str, Any]:
+    units = {"Pa": "_pa", "1": "", "rad": "_rad"}[LAYOUT.variables[name].units]
+    return {
+        "name": name,
+        f"mean{units}": float(c.mean[-1]),
+        f"low{units}": float(c.low[-1]),
+        f"high{units}": float(c.high[-1]),
+        "variation": float(c.deviation[-1] / abs(c.mean[-1])) if c.mean[-1] else None,
+    }
+
+
+def _read(inputs: Sequence[Path], progress: Progress) -> list[Run]:
+    """All runs; every fault of any of them at once."""
+    runs: list[Run] = []
+    faults: list[Fault] = []
+    for k, path in enumerate(inputs):
+        progress(0.1 * k / len(inputs), f"reading {path.name}")
+        try:
+            runs.append(read_run(path))
+        except BadInput as error:
+            faults += error.faults
+    for other in runs[1:]:
+        first = runs[0].confining_stress
+        if abs(other.confining_stress - first) > 1e-6 * max(abs(first), 1.0):
+            found, expected = (
+                f"{other.confining_stress:g} Pa",
+                f"{first:g} Pa as in {runs[0].path.name}: one study per lateral stress",
+            )
+            faults.append(Fault(str(other.path), "confining_stress", found, expected))
+    for source in runs:
+        if source.history.time.size < 3:
+            faults.append(
+                Fault(str(source.path), "dim time", str(source.history.time.size), "at least three saved states")
+            )
+    if faults:
+        raise BadInput(faults)
+    return runs
+
+
+def _centres(runs: list[Run], scene: RevStudyScene) -> np.ndarray:
+    """(run, centre, 2) m. A grid is as wide as the largest radius leaves room for in each model."""
+    largest = scene.samples.radii[-1]
+    if scene.samples.centres:
+        centres = np.tile(np.asarray(scene.samples.centres, dtype=np.float64), (len(runs), 1, 1))
+    else:
+        centres = np.array([_grid(source, largest, scene.samples.grid) for source in runs])
+    faults = []
+    for source, points in zip(runs, centres):
+        for point in points:
+            faults += source.refuse_outside(Circle((float(point[0]), float(point[1])), largest), "samples.radii")
+    if faults:
+        raise BadInput(faults)
+    return centres
+
+
+def _grid(source: Run, largest: float, side: int) -> np.ndarray:
+    low, high = source.history.domain.min(axis=0), source.history.domain.max(axis=0)
+    middle = 0.5 * (low + high)
+    room = np.maximum(0.5 * (high - low) - largest, 0.0)
+    if side > 1 and not (room > 0.0).all():
+        raise BadInput(
+            Fault(
+                str(source.path),
+                "samples.radii",
+                f"{largest:g} m",
+                "a largest radius that leaves room for a grid of centres",
+            )
+        )
+    steps = np.linspace(-1.0, 1.0, side) if side > 1 else np.zeros(1)
+    x, y = np.meshgrid(middle[0] + room[0] * steps, middle[1] + room[1] * steps, indexing="ij")
+    return np.stack([x.ravel(), y.ravel()], axis=1)
+
+
+def _chunks(runs: list[Run], centres: np.ndarray, scene: RevStudyScene) -> list[Chunk]:
+    """Samples in the order (run, centre, radius), some centres of one run per chunk, so that each is read seldom."""
+    chunks = []
+    for source, points in zip(runs, centres):
+        for part in np.array_split(points, min(4, len(points))):
+            chunks.append((source.path, [(r, float(x), float(y)) for x, y in part for r in scene.samples.radii]))
+    return chunks
+
+
+def sample_chunk(chunk: Chunk) -> list[Sample]:
+    """The averages of one chunk; runs in a worker process."""
+    path, places = chunk
+    history = read_run(path).history
+    results = []
+    for radius, x, y in places:
+        a = average(history, Circle((x, y), radius))
+        results.append((a.stress, a.strain, a.area, int(a.outline.blocks.sum())))
+    return results
+
+
+def _sampled(chunks: list[Chunk], processes: int, progress: Progress) -> list[Sample]:
+    """All samples in the order of the chunks, whatever the number of processes and their fate."""
+    results = computed(sample_chunk, chunks, processes, lambda f: progress(0.1 + 0.9 * f, "averaging"))
+    return [sample for part in results for sample in part]
+
+
+def computed(
+    work: Callable[[Any], Any], tasks: Sequence[Any], processes: int, done: Callable[[float], None]
+) -> list[Any]:
+    """`work` of every task, in order, in worker processes; what a killed worker had not finished is done again."""
+    results: dict[int, Any] = {}
+    if processes == 1 or len(tasks) == 1:
+        for k, task in enumerate(tasks):
+            results[k] = work(task)
+            done(len(results) / len(tasks))
+        return [results[k] for k in range(len(tasks))]
+    for attempt in range(_ATTEMPTS):
+        left = [k for k in range(len(tasks)) if k not in results]
+        if not left:
+            break
+        with ProcessPoolExecutor(min(processes, len(left))) as pool:
+            futures: dict[int, Future[Any]] = {k: pool.submit(work, tasks[k]) for k in left}
+            for k, future in futures.items():
+                try:
+                    results[k] = future.result()
+                except BrokenProcessPool:
+                    if attempt == _ATTEMPTS - 1:
+                        raise
+                    continue
+                done(len(results) / len(tasks))
+    return [results[k] for k in range(len(tasks))]
+
+
+def _arrays(runs: list[Run], centres: np.ndarray, samples: list[Sample], scene: RevStudyScene) -> dict[str, Any]:
+    """Samples as (radius, centre, run, ...)."""
+    shape = (len(runs), centres.shape[1], len(scene.samples.radii))
+    longest = max(stress.shape[0] for stress, *_ in samples)
+
+    def gathered(values: list[Any]) -> np.ndarray:
+        whole = np.asarray(values)
+        return np.moveaxis(whole.reshape(*shape, *whole.shape[1:]), (0, 1, 2), (2, 1, 0))
+
+    def padded(part: np.ndarray) -> np.ndarray:
+        return np.concatenate([part, np.full((longest - part.shape[0], 4), np.nan)])
+
+    measures = gathered([curve_measures(s, e, scene.curves.secant_level) for s, e, _, _ in samples])
+    return {
+        "radius": np.asarray(scene.samples.radii),
+        "centre_position": centres,
+        "run_name": np.array([source.path.stem for source in runs]),
+        "confining_stress": runs[0].confining_stress,
+        "area": gathered([area for _, _, area, _ in samples]),
+        "block_count": gathered([blocks for *_, blocks in samples]),
+        "stress": gathered([padded(s) for s, *_ in samples]),
+        "strain": gathered([padded(e) for _, e, *_ in samples]),
+        **{name: measures[..., k] for k, name in enumerate(MEASURES)},
+    }
+
+
+def _statistics(arrays: dict[str, Any], criteria: Criteria, scene: RevStudyScene) -> dict[str, Convergence]:
+    """Convergence of each scalar that has a value at every radius."""
+    by_name = {}
+    for k, name in enumerate(MEASURES):
+        values = arrays[name]
+        if np.isfinite(values).any(axis=(1, 2)).all():
+            by_name[name] = convergence(values, criteria, scene.seed + k)
+    return by_name
