@@ -68,7 +68,7 @@ def test_the_json_schema_tells_editors_the_keys(kind):
 
 
 def test_every_fault_is_named_at_once(scene_file):
-    path = scene_file(template("blocks").replace("seed = ", "seed = -", 1) + "\n[nonsense]\nkey = 1\n")
+    path = scene_file(template("blocks").replace("seed = 0", "seed = -1", 1) + "\n[nonsense]\nkey = 1\n")
     with pytest.raises(BadInput) as caught:
         load_scene(path, "blocks")
     keys = {fault.key for fault in caught.value.faults}

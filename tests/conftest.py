@@ -1,0 +1,56 @@
+"""Small real artifacts that several tests read; each is made once per session by the command that makes it."""
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from graben.cli.main import main
+
+ROOT = Path(__file__).parents[1]
+PIPELINES = ROOT / "pipelines"
+
+SMALL_BLOCKS = [
+    "fidelity=draft", 'domain.width="3 m"', 'domain.height="3 m"', 'loading.duration="4 s"', "loading.states=5",
+]  # fmt: skip
+SMALL_BED = ["fidelity=draft", 'box.width="0.6 mm"', 'box.depth="0.3 mm"']
+
+
+def command(*arguments):
+    """Run `graben ARGUMENTS...` in this process; returns click's result."""
+    return CliRunner().invoke(main, [str(a) for a in arguments])
+
+
+def settings(overrides):
+    """--set options for a list of KEY=VALUE."""
+    return [part for override in overrides for part in ("--set", override)]
+
+
+def made(*arguments):
+    result = command(*arguments)
+    assert result.exit_code == 0, result.output
+    return result
+
+
+@pytest.fixture(scope="session")
+def small_blocks(tmp_path_factory):
+    """Artifact of 38 blocks compressed by 0.2 %."""
+    path = tmp_path_factory.mktemp("blocks") / "small.nc"
+    made("dem-run", PIPELINES / "upscaling/voronoi-granite.toml", *settings(SMALL_BLOCKS), "-o", path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def small_curves(small_blocks):
+    """Averages of `small_blocks` over a circle of 1 m."""
+    path = small_blocks.with_name("curves.nc")
+    made("homogenize", small_blocks, "--radius", "1 m", "-o", path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def small_bed(tmp_path_factory):
+    """Artifact of a bed of some hundred grains."""
+    path = tmp_path_factory.mktemp("bed") / "bed.nc"
+    made("dem-run", PIPELINES / "wear/bed.toml", *settings(SMALL_BED), "-o", path)
+    return path
