@@ -63,7 +63,7 @@ def _volumes(state: Snapshot, result: ScratchRun) -> VolumeLedger:
     living = state.alive == 1
     return volume_ledger(
         state.points,
-        state.faces,
+        np.concatenate([state.faces, state.supports]),
         float(state.tip[0]),
         float(result.first_volumes[living].sum()),
         float(state.volumes[living].sum()),

@@ -71,7 +71,7 @@ class Damage(Model):
 
     growth_per_joule: float = key(
         3e5,
-        "alpha of H (6.98): largest growth of damage per joule of work of the tip on the whole specimen. H prints 0.05 "
+        "alpha of H (6.98): largest growth of damage per joule of work of the tip on the specimen. H prints 0.05 "
         "with units that change; too small does nothing, too large deletes the track: a study, not a constant",
         gt=0,
     )
@@ -137,7 +137,7 @@ class ScratchScene(Scene):
             wrong.append(f"specimen.width of at least 2.4 contact half-widths ({2.4e6 * a:.3g} um)")
         if self.tip.start < a or self.tip.start + self.tip.path + a > self.specimen.length:
             wrong.append(f"a path that stays a contact half-width ({1e6 * a:.3g} um) inside specimen.length")
-        if self.mesh.size * self.mesh.draft_factor > a and self.fidelity == "draft" or self.mesh.size > a:
+        if (self.mesh.size * self.mesh.draft_factor > a and self.fidelity == "draft") or self.mesh.size > a:
             wrong.append(f"mesh.size below the contact half-width ({1e6 * a:.3g} um)")
         if self.damage is not None and self.material.law not in (None, "erve"):
             wrong.append('material.law = "erve", because [damage] is given')

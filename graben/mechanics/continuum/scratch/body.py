@@ -15,7 +15,7 @@ from graben.mechanics.continuum.scratch.mesh import Floats, HexMesh
 from graben.mechanics.continuum.scratch.motion import tip_position
 from graben.mechanics.continuum.scratch.one_point import EXTERNAL, KINETIC, LEDGER_SIZE, forces_one_point
 from graben.mechanics.continuum.scratch.stepping import kick_and_drift, kinetic_energy, refresh
-from graben.mechanics.continuum.scratch.surface import contact_stiffness, exposed_faces
+from graben.mechanics.continuum.scratch.surface import bared_supports, contact_stiffness, exposed_faces
 from graben.mechanics.failure import NumericsFailed
 
 if TYPE_CHECKING:
@@ -246,4 +246,5 @@ class Body:
             alive=self.alive.copy(),
             volumes=self.vol.copy(),
             faces=self.faces.copy(),
+            supports=bared_supports(self.mesh, self.alive),
         )

@@ -82,7 +82,7 @@ class Damage:
 @dataclass
 class Snapshot:
     """State of the body at one time: positions (n, 3), stress (e, 6) in space, p (e,), damage (e,), living (e,),
-    volumes (e,) [m3], exposed faces (f, 4)."""
+    volumes (e,) [m3], exposed faces (f, 4), and the held faces (g, 4) that removal bared."""
 
     name: str
     time: float
@@ -94,6 +94,7 @@ class Snapshot:
     alive: Ints
     volumes: Floats
     faces: Ints
+    supports: Ints
 
 
 @dataclass

@@ -28,6 +28,18 @@ def exposed_faces(mesh: HexMesh, alive: NDArray[np.int64]) -> tuple[Ints, Ints]:
     return np.ascontiguousarray(faces[~held]), np.ascontiguousarray(owners[~held])
 
 
+def bared_supports(mesh: HexMesh, alive: NDArray[np.int64]) -> Ints:
+    """Faces (m, 4) of removed elements on held boundaries, turned towards the void: with the exposed faces they
+    close the surface of a specimen that is worn through."""
+    if alive.all():
+        return np.empty((0, 4), dtype=np.int64)
+    faces = mesh.cells[alive == 0][:, FACES].reshape(-1, 4)
+    held = (mesh.free[faces] == 0.0).all(axis=(1, 2))
+    key = np.sort(faces[held], axis=1)
+    _, first, counts = np.unique(key, axis=0, return_index=True, return_counts=True)
+    return np.ascontiguousarray(faces[held][np.sort(first[counts == 1])][:, ::-1])
+
+
 def contact_stiffness(
     mesh: HexMesh, faces: Ints, owners: Ints, volumes: Floats, modulus: float, factor: float
 ) -> tuple[Ints, Floats]:
