@@ -4,6 +4,7 @@ import importlib.util
 import json
 import os
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ HERE = Path(__file__).parents[1] / "mechanics" / "averaging"
 STRAIN = np.array([[1e-3, 4e-4], [0.0, -3e-3]])
 
 
+@cache
 def load(name):
     spec = importlib.util.spec_from_file_location(f"averaging_{name}", HERE / f"{name}.py")
     module = importlib.util.module_from_spec(spec)

@@ -93,6 +93,11 @@ class History:
         return np.gradient(self.displacement, self.time, axis=0, edge_order=2 if self.time.size > 2 else 1)
 
     @cached_property
+    def motion(self) -> tuple[Floats, Floats, Floats]:
+        """Affine motion of each block between saved states, see `block_motion`."""
+        return block_motion(self.current, self.velocity, self.vertex_block, self.corner_count.size)
+
+    @cached_property
     def domain(self) -> Floats:
         """(n, 2) m outline of the whole model at the first state."""
         return domain_outline(self.network)
@@ -177,13 +182,11 @@ def average(history: History, rev: Rev, deformed: bool = False, chosen_at: int =
     symmetric, resultant, skew = boundary_average(forces, count, measure, origin)
     stress_boundary = np.stack([symmetric[:, 0], symmetric[:, 1], stress[:, 2], symmetric[:, 2]], axis=1)
     moment = per_state(forces.state, forces.force[:, :, None] * (forces.position - origin)[:, None, :], count)
-    motion = block_motion(
-        history.current, history.velocity, history.vertex_block, history.corner_count.size, outline.blocks
-    )
     work = hill_mandel(
         forces,
         history.time,
-        motion,
+        history.motion,
+        history.motion[1][:, outline.blocks].mean(axis=1),
         outline_gradient(now, outline.follow(history.velocity)),
         moment / current_area[:, None, None],
         current_area,

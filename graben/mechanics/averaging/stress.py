@@ -147,7 +147,8 @@ class HillMandel:
 def hill_mandel(
     forces: BoundaryForces,
     time: Floats,
-    block_position: tuple[Floats, Floats, Floats, Floats],
+    motion: tuple[Floats, Floats, Floats],
+    mean: Floats,
     gradient: Floats,
     stress: Floats,
     area: Floats,
@@ -161,12 +162,13 @@ def hill_mandel(
     ----------
     forces : as `forces_on`
     time : (time,) s, rising
-    block_position : result of `block_motion`
+    motion : middle, velocity and velocity gradient of blocks, from `block_motion`
+    mean : (time, 2) m/s, a velocity near that of the whole; balanced forces do no work on it
     gradient : (time, 2, 2) average velocity gradient, 1/s
     stress : (time, 2, 2) Pa, the boundary-force stress, not symmetrized
     area : scalar or (time,) m2
     """
-    middle, velocity, spin, mean = block_position
+    middle, velocity, spin = motion
     count = time.size
     t, b = forces.state, forces.block
     arm = forces.position - middle[t, b]
@@ -183,20 +185,18 @@ def hill_mandel(
 
 
 def block_motion(
-    position: Floats, velocity: Floats, vertex_block: Ints, block_count: int, inside: Flags
-) -> tuple[Floats, Floats, Floats, Floats]:
+    position: Floats, velocity: Floats, vertex_block: Ints, block_count: int
+) -> tuple[Floats, Floats, Floats]:
     """Best affine motion of each block over its vertices.
 
     Parameters
     ----------
     position, velocity : (time, vertex, 2) m, m/s
     vertex_block : (vertex,)
-    inside : (block,) blocks over which the mean velocity is taken
 
     Returns
     -------
-    middle : (time, block, 2) m; velocity : (time, block, 2) m/s there; gradient : (time, block, 2, 2) 1/s;
-    mean : (time, 2) m/s
+    middle : (time, block, 2) m; velocity : (time, block, 2) m/s there; gradient : (time, block, 2, 2) 1/s
     """
     count = np.maximum(np.bincount(vertex_block, minlength=block_count), 1).astype(np.float64)
     order = np.argsort(vertex_block, kind="stable")
@@ -216,4 +216,4 @@ def block_motion(
     inverse[..., 0, 1] = inverse[..., 1, 0] = -spread[..., 0, 1]
     safe = np.where(det > 0.0, det, 1.0)
     gradient = drive @ (inverse / safe[..., None, None]) * (det > 0.0)[..., None, None]
-    return middle, speed, gradient, speed[:, inside].mean(axis=1)
+    return middle, speed, gradient

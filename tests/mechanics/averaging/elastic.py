@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
+from scipy.spatial import cKDTree
 
 
 @dataclass
@@ -44,7 +45,8 @@ def solve(model, held: np.ndarray, gradient: np.ndarray, young=65e9, poisson=0.2
     stiff = np.einsum("z,zai,ab,zbj->zij", 0.5 * np.abs(twice), b, law[[0, 1, 3]], b)
     dof = np.stack([2 * tri, 2 * tri + 1], axis=2).reshape(-1, 6)
     rows, cols = np.repeat(dof, 6, axis=1).ravel(), np.tile(dof, (1, 6)).ravel()
-    pair = np.array([(i, j) for i in range(n) for j in range(i + 1, n) if np.hypot(*(x[i] - x[j])) < 1e-9])
+    pair = np.sort(cKDTree(x).query_pairs(1e-9, output_type="ndarray"), axis=1)
+    pair = pair[np.lexsort(pair.T[::-1])]
     values = stiff.ravel()
     for axis in (0, 1):
         i, j = 2 * pair[:, 0] + axis, 2 * pair[:, 1] + axis
