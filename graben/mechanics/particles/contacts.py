@@ -104,35 +104,36 @@ def rub(nx, ny, nz, px, py, pz, sx, sy, sz, kt, ct, limit, dt):
     py -= pn * ny
     pz -= pn * nz
     # the stored force turns with the contact plane and keeps its size
-    before = np.sqrt(sx * sx + sy * sy + sz * sz)
-    sn = sx * nx + sy * ny + sz * nz
-    sx -= sn * nx
-    sy -= sn * ny
-    sz -= sn * nz
-    after = np.sqrt(sx * sx + sy * sy + sz * sz)
-    if after > 0.0:
-        scale = before / after
-        sx *= scale
-        sy *= scale
-        sz *= scale
+    before2 = sx * sx + sy * sy + sz * sz
+    if before2 > 0.0:
+        sn = sx * nx + sy * ny + sz * nz
+        sx -= sn * nx
+        sy -= sn * ny
+        sz -= sn * nz
+        after2 = sx * sx + sy * sy + sz * sz
+        if after2 > 0.0:
+            scale = np.sqrt(before2 / after2)
+            sx *= scale
+            sy *= scale
+            sz *= scale
     ox, oy, oz = sx, sy, sz
     sx += kt * px * dt
     sy += kt * py * dt
     sz += kt * pz * dt
-    size = np.sqrt(sx * sx + sy * sy + sz * sz)
-    if size > limit:
-        scale = limit / size
+    size2 = sx * sx + sy * sy + sz * sz
+    if size2 > limit * limit:
+        scale = limit / np.sqrt(size2)
         sx *= scale
         sy *= scale
         sz *= scale
         # work of the leapfrog (mean of old and new force) less what the spring kept
         work = 0.5 * ((ox + sx) * px + (oy + sy) * py + (oz + sz) * pz) * dt
-        lost = work - 0.5 * (limit * limit - before * before) / kt
+        lost = work - 0.5 * (limit * limit - before2) / kt
         return sx, sy, sz, sx, sy, sz, lost
     tx, ty, tz = sx + ct * px, sy + ct * py, sz + ct * pz
-    total = np.sqrt(tx * tx + ty * ty + tz * tz)
-    if total > limit:  # the dashpot may not carry more than friction allows
-        scale = limit / total
+    total2 = tx * tx + ty * ty + tz * tz
+    if total2 > limit * limit:  # the dashpot may not carry more than friction allows
+        scale = limit / np.sqrt(total2)
         tx *= scale
         ty *= scale
         tz *= scale
@@ -214,10 +215,10 @@ def rough_forces(
                 px -= oy * gz - oz * gy
                 py -= oz * gx - ox * gz
                 pz -= ox * gy - oy * gx
-                s = slip[k]
                 sx, sy, sz, tx, ty, tz, gone = rub(
-                    gx, gy, gz, px, py, pz, s[0], s[1], s[2], kt[ci, cj], ct[ci, cj], friction * total, dt
-                )
+                    gx, gy, gz, px, py, pz, slip[k, 0], slip[k, 1], slip[k, 2], kt[ci, cj], ct[ci, cj],
+                    friction * total, dt,
+                )  # fmt: skip
                 rubbed += gone
                 slip[k, 0] = sx
                 slip[k, 1] = sy

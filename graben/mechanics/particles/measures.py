@@ -79,8 +79,8 @@ def survey(
                 k = wall_kn[kind[i]]
                 elastic += 0.5 * k * overlap * overlap
                 if rubs:
-                    t = wall_slip[i, w]
-                    elastic += 0.5 * (t[0] ** 2 + t[1] ** 2 + t[2] ** 2) / wall_kt[kind[i]]
+                    s2 = wall_slip[i, w, 0] ** 2 + wall_slip[i, w, 1] ** 2 + wall_slip[i, w, 2] ** 2
+                    elastic += 0.5 * s2 / wall_kt[kind[i]]
                 rows[i, a] += k
                 force_sum += k * overlap
                 contacts += 1

@@ -109,10 +109,10 @@ def move(
                     px = -v0 - arm * (spin[i, 1] * nz - spin[i, 2] * ny)
                     py = -v1 - arm * (spin[i, 2] * nx - spin[i, 0] * nz)
                     pz = -v2 - arm * (spin[i, 0] * ny - spin[i, 1] * nx)
-                    t = wall_slip[i, w]
                     sx, sy, sz, tx, ty, tz, gone = rub(
-                        nx, ny, nz, px, py, pz, t[0], t[1], t[2], wall_kt[c], wall_ct[c], wall_friction * total, dt
-                    )
+                        nx, ny, nz, px, py, pz, wall_slip[i, w, 0], wall_slip[i, w, 1], wall_slip[i, w, 2],
+                        wall_kt[c], wall_ct[c], wall_friction * total, dt,
+                    )  # fmt: skip
                     rubbed += gone
                     wall_slip[i, w, 0] = sx
                     wall_slip[i, w, 1] = sy
@@ -124,8 +124,7 @@ def move(
                     torque[i, 1] += arm * (nz * tx - nx * tz)
                     torque[i, 2] += arm * (nx * ty - ny * tx)
             elif rubs:
-                t = wall_slip[i, w]
-                s2 = t[0] * t[0] + t[1] * t[1] + t[2] * t[2]
+                s2 = wall_slip[i, w, 0] ** 2 + wall_slip[i, w, 1] ** 2 + wall_slip[i, w, 2] ** 2
                 if s2 > 0.0:
                     rubbed += 0.5 * s2 / wall_kt[c]
                     wall_slip[i, w, 0] = wall_slip[i, w, 1] = wall_slip[i, w, 2] = 0.0
