@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from graben.mechanics.blocks.polygons import distance_to_sides
 from graben.mechanics.blocks.tessellation import Tessellation
 
 # A corner that turns less than this is no corner: neither chamfered nor counted [rad].
@@ -67,8 +68,6 @@ def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> 
     edge = np.vstack(edges)
     block = np.repeat(np.arange(tessellation.size), owner)
     tolerance = 1e-6 * float(np.ptp(tessellation.outline, axis=0).max())
-    from graben.mechanics.blocks.polygons import distance_to_sides
-
     on_side = distance_to_sides(x, tessellation.outline) < tolerance
     both = on_side[edge[:, 0]] & on_side[edge[:, 1]]
     edge_side = np.where(both.any(axis=1), both.argmax(axis=1), -1)

@@ -27,9 +27,7 @@ def rectangle_sides(outline: np.ndarray) -> Sides:
     d = np.roll(outline, -1, axis=0) - outline
     if len(outline) != 4 or np.any(np.abs(d[:, 0] * d[:, 1]) > 1e-9 * np.abs(d).max() ** 2):
         raise ValueError("biaxial compression needs an upright rectangle as domain")
-    return Sides(
-        int(np.argmax(d[:, 0])), int(np.argmax(d[:, 1])), int(np.argmin(d[:, 0])), int(np.argmin(d[:, 1]))
-    )
+    return Sides(int(np.argmax(d[:, 0])), int(np.argmax(d[:, 1])), int(np.argmin(d[:, 0])), int(np.argmin(d[:, 1])))
 
 
 def consolidate(
@@ -83,13 +81,13 @@ def compress(
     b, s = model.bodies, model.skeleton
     sides = rectangle_sides(b.outline)
     top = b.vertex_side[:, sides.top]
+    model.motion.tally[:] = 0.0
+    model.motion.sums[rx.FRICTION] = 0.0
+    save(0, model)
     s.steady[top, 1] = model.weight[top, 1]
     model.hold(top, 1, speed)
     d = model.motion.drive
     d[rx.SPEED], d[rx.SPEED_STEP] = 0.0, 1.0 / max(1.0, ramp_share * steps)
-    model.motion.tally[:] = 0.0
-    model.motion.sums[rx.FRICTION] = 0.0
-    save(0, model)
     done = 0
     for k in range(1, states):
         target = round(steps * k / (states - 1))

@@ -50,7 +50,7 @@ class History:
         rows["velocity"].append(m.motion.v.copy())
         rows["zone_stress"].append(m.zone_stress())
         rows["boundary_force"].append(force)
-        rows["wall_reaction"].append(side_forces(force, b.vertex_side))
+        rows["wall_reaction"].append(side_forces(force, b.vertex_side, b.outline))
         rows["energy"].append(np.array([energy[k] for k in ENERGIES]))
         rows["contact"].append(out)
         pair = ints[:, 0]
@@ -93,10 +93,17 @@ class History:
         return result
 
 
-def side_forces(force: np.ndarray, vertex_side: np.ndarray) -> np.ndarray:
-    """External force (sides, 2) on each side of the domain [N/m]; a corner counts half for each of its sides."""
-    share = vertex_side / np.maximum(1, vertex_side.sum(axis=1))[:, None]
-    return share.T @ force
+def side_forces(force: np.ndarray, vertex_side: np.ndarray, outline: np.ndarray) -> np.ndarray:
+    """External force (sides, 2) on each side of the domain [N/m] from forces on vertices (vertices, 2).
+
+    What acts on a corner goes, component by component, to the side whose normal has the larger part in it.
+    """
+    along = np.roll(outline, -1, axis=0) - outline
+    part = np.abs(along[:, ::-1]) / np.linalg.norm(along, axis=1)[:, None]
+    # A side parallel to a component takes it only where no other side is there.
+    weight = vertex_side[:, :, None] * (part[None] + 1e-9)
+    weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
+    return np.einsum("vsd,vd->sd", weight, force)
 
 
 def mean_stress(zone_stress: np.ndarray, area: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -1,7 +1,8 @@
 """Coulomb joints between blocks: contact of two nearly antiparallel edges over the interval that they share.
 
 On the common tangent the edges overlap over a length L. At each end of it the overlap gives the normal stress
-(total, so it never drifts) and the sliding gives the shear stress (incremental, kept per end); each end acts on L / 2.
+(total, so it never drifts) and the sliding gives the shear stress (incremental, kept per end); each end acts on
+L / 2.
 Area contact: sigma = kn (overlap + dilation), |tau| <= cohesion + sigma tan(phi).
 
 Equal and opposite forces act at one point midway between the edges, so forces and moments balance to round-off.
@@ -55,14 +56,14 @@ class Pairs(NamedTuple):
     intact: np.ndarray
 
 
-# Columns of the node table: position, velocity, and of the edge that starts there unit tangent and length. One cache
-# line a node, since the contact kernel reads nodes in no order.
-X, Y, VX, VY, TX, TY, LENGTH, COLUMNS = 0, 1, 2, 3, 4, 5, 6, 8
+# Columns of the node table: position, velocity, and of the edge that starts there unit tangent, length and whether it
+# is a chamfer (1 or 0). One cache line a node, since the contact kernel reads nodes in no order.
+X, Y, VX, VY, TX, TY, LENGTH, CHAMFER, COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
 
 @kernel
 def node_motion(x, v, first, second, weight, follow, node):
-    """Fill the node table (nodes, 8) from vertex positions x and velocities v (vertices, 2)."""
+    """Fill the node table (nodes, 8) from vertex positions x and velocities v (vertices, 2); CHAMFER stays."""
     for i in range(first.shape[0]):
         a = first[i]
         b = second[i]
@@ -92,6 +93,18 @@ def scatter_nodes(fn, first, second, weight, force):
         for d in range(2):
             force[a, d] += (1.0 - w) * fn[i, d]
             force[b, d] += w * fn[i, d]
+
+
+@kernel
+def _pressed_share(gap0, gap1, chamfer):
+    """Share of the interval that a chamfer bears on: up to where the gap opens. 1 for plain edges.
+
+    A plain edge keeps the half length of each end whole, as the reference model does; a chamfer stands for a
+    rounded corner, and where only its rim is pressed it must not act with its whole length.
+    """
+    if chamfer == 0.0 or gap0 * gap1 >= 0.0:
+        return 1.0
+    return abs(min(gap0, gap1)) / abs(gap1 - gap0)
 
 
 @kernel
@@ -185,6 +198,7 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
         area = 0.5 * length
         if facing < FACING_FULL:
             area *= (facing - FACING_NONE) / (FACING_FULL - FACING_NONE)
+        area *= _pressed_share(gap0, gap1, node[e, CHAMFER] + node[f, CHAMFER])
         fex0 = 0.0
         fey0 = 0.0
         fex1 = 0.0
@@ -262,8 +276,8 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
 def contact_state(pairs, follow, node, joint, deepest, out, ints):
     """State of all touching candidates, for output. Returns (their number, stored joint energy [J/m]).
 
-    out : (n, 11) position x, y [m]; force on the first edge x, y [N/m]; mean normal (tension positive) and shear stress
-    [Pa]; length [m]; mean net slip [m]; mean opening [m]; unit tangent x, y. ints : (n, 2) pair and state flag.
+    out : (n, 11) position x, y [m]; force on the first edge x, y [N/m]; mean normal (tension positive) and shear
+    stress [Pa]; length [m]; mean net slip [m]; mean opening [m]; unit tangent x, y. ints : (n, 2) pair and state flag.
     """
     count = 0
     stored = 0.0
@@ -294,6 +308,9 @@ def contact_state(pairs, follow, node, joint, deepest, out, ints):
         area = 0.5 * (high - low)
         if facing < FACING_FULL:
             area *= (facing - FACING_NONE) / (FACING_FULL - FACING_NONE)
+        gap0 = h1 + (h0 - h1) * (low - s1) / (s0 - s1) - rise * low
+        gap1 = h1 + (h0 - h1) * (high - s1) / (s0 - s1) - rise * high
+        area *= _pressed_share(gap0, gap1, node[e, CHAMFER] + node[f, CHAMFER])
         normal = 0.0
         shear = 0.0
         gaps = 0.0
@@ -316,9 +333,13 @@ def contact_state(pairs, follow, node, joint, deepest, out, ints):
             closed += 1
             normal -= 0.5 * sigma
             shear += 0.5 * pairs.shear[c, k]
-            stored += 0.5 * area * (
-                sigma * sigma / joint.normal_stiffness
-                + pairs.shear[c, k] * pairs.shear[c, k] / joint.shear_stiffness
+            stored += (
+                0.5
+                * area
+                * (
+                    sigma * sigma / joint.normal_stiffness
+                    + pairs.shear[c, k] * pairs.shear[c, k] / joint.shear_stiffness
+                )
             )
             if flag == SLIP and worst == STICK:
                 worst = SLIP

@@ -9,7 +9,7 @@ import numpy as np
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks import search, zones
 from graben.mechanics.blocks.bodies import Bodies, Skin, chamfered_skin
-from graben.mechanics.blocks.joints import COLUMNS, STICK, TX, TY, Joint, Pairs, contact_state, node_motion
+from graben.mechanics.blocks.joints import CHAMFER, COLUMNS, STICK, TX, TY, Joint, Pairs, contact_state, node_motion
 from graben.mechanics.failure import NumericsFailed
 
 
@@ -21,7 +21,7 @@ class Damping:
     coefficient `coefficient` [1/s] stays (0: none). local : share of the unbalanced force, 0 to 1.
     """
 
-    ratio: float = 1.0
+    ratio: float = 0.5
     coefficient: float = 0.0
     local: float = 0.0
 
@@ -115,6 +115,7 @@ class BlockModel:
             np.zeros(2),
             np.zeros(5),
         )
+        self.motion.node[:, CHAMFER] = self.skin.is_chamfer
         self.pairs: Pairs = search.no_pairs()
         self.steps_done = 0
         self.time = 0.0
@@ -123,9 +124,7 @@ class BlockModel:
         self.fastest = 0.02 * size / self.dt
         self._low = bodies.position.min(axis=0) - size
         self._span = np.ptp(bodies.position, axis=0) + 2.0 * size
-        self.motion.drive[rx.DAMPING] = (
-            self.damping.coefficient if self.damping.ratio < 0 else 0.01 / self.dt
-        )
+        self.motion.drive[rx.DAMPING] = self.damping.coefficient if self.damping.ratio < 0 else 0.01 / self.dt
         self.rebuild(first=intact)
 
     def _vertex_stiffness(self, gradient, area, lam, mu) -> np.ndarray:
@@ -285,9 +284,7 @@ class BlockModel:
         node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.node)
         n = len(self.pairs.key)
         out, ints = np.zeros((n, 11)), np.zeros((n, 2), dtype=np.int64)
-        count, stored = contact_state(
-            self.pairs, s.follow, m.node, self.joint, self.deepest, out, ints
-        )
+        count, stored = contact_state(self.pairs, s.follow, m.node, self.joint, self.deepest, out, ints)
         return out[:count], ints[:count], stored
 
     def energies(self) -> dict[str, float]:
@@ -306,13 +303,7 @@ class BlockModel:
             "joint_work": float(t[rx.JOINT_WORK]),
         }
         e["error"] = (
-            e["boundary"]
-            + e["external"]
-            - e["kinetic"]
-            - e["strain"]
-            - e["joint"]
-            - e["friction"]
-            - e["damping"]
+            e["boundary"] + e["external"] - e["kinetic"] - e["strain"] - e["joint"] - e["friction"] - e["damping"]
         )
         return e
 

@@ -1,4 +1,4 @@
-"""Explicit motion of all blocks: one compiled loop that comes back only to rebuild contacts, to save, or on failure."""
+"""Explicit motion of all blocks: one compiled loop that returns only to search contacts, to save or on failure."""
 
 from __future__ import annotations
 
@@ -112,9 +112,7 @@ def advance(
                 far = _moved(m.node, m.built)
                 if not far < rebuild_at:
                     return REBUILD, step, -1
-                m.active_count[0] = choose_active(
-                    pairs, s.follow, m.node, near, joint.dilation, m.active
-                )
+                m.active_count[0] = choose_active(pairs, s.follow, m.node, near, joint.dilation, m.active)
                 m.chosen[:] = m.node[:, :2]
             check = 4
         check -= 1

@@ -8,6 +8,7 @@ brings the blocks to the corner statistics of the reference model (4.3 to 4.4 co
 from __future__ import annotations
 
 import heapq
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -151,7 +152,7 @@ def _conforming(points, start, corner, outline, check: bool = True) -> Tessellat
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     _, label = connected_components(graph, directed=False)
     _, first, number = np.unique(label, return_index=True, return_inverse=True)
-    rings = [_without_repeats(number[corner[a:b]].tolist()) for a, b in zip(start[:-1], start[1:])]
+    rings = [_without_repeats(number[corner[a:b]].tolist()) for a, b in itertools.pairwise(start)]
     if check and min(len(r) for r in rings) < 3:
         raise ValueError("tessellation: a block has fewer than three corners")
     return _from_rings(points[first], rings, outline)
@@ -180,7 +181,7 @@ def collapse_short_edges(tessellation: Tessellation, shortest: float) -> Tessell
     points = tessellation.points.copy()
     outline = tessellation.outline
     start, corner = tessellation.start, tessellation.corner
-    rings = [corner[a:b].tolist() for a, b in zip(start[:-1], start[1:])]
+    rings = [corner[a:b].tolist() for a, b in itertools.pairwise(start)]
     tolerance = 1e-6 * float(np.ptp(outline, axis=0).max())
     on_side = polygons.distance_to_sides(points, outline) < tolerance
     sides = [frozenset(np.flatnonzero(row).tolist()) for row in on_side]

@@ -1,7 +1,7 @@
 """Constant-strain triangles, total Lagrangian, plane strain.
 
-The strain is Green's, E = (F^T F - 1) / 2 with F = dx/dX, and S = lambda tr(E) 1 + 2 mu E: no stress and no drift under
-rotation of any size. Nodal forces are -A F S grad N, the Cauchy stress is F S F^T / det F.
+The strain is Green's, E = (F^T F - 1) / 2 with F = dx/dX, and S = lambda tr(E) 1 + 2 mu E: no stress and no drift
+under rotation of any size. Nodal forces are -A F S grad N, the Cauchy stress is F S F^T / det F.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ def shape_gradients(position: np.ndarray, triangles: np.ndarray):
     p = position[triangles]
     edge = np.roll(p, -2, axis=1) - np.roll(p, -1, axis=1)  # opposite each corner
     area = 0.5 * (
-        (p[:, 1, 0] - p[:, 0, 0]) * (p[:, 2, 1] - p[:, 0, 1])
-        - (p[:, 1, 1] - p[:, 0, 1]) * (p[:, 2, 0] - p[:, 0, 0])
+        (p[:, 1, 0] - p[:, 0, 0]) * (p[:, 2, 1] - p[:, 0, 1]) - (p[:, 1, 1] - p[:, 0, 1]) * (p[:, 2, 0] - p[:, 0, 0])
     )
     if np.any(area <= 0.0):
         raise ValueError(f"zone {int(np.argmin(area))} is turned over or has no area")

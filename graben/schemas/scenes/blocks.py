@@ -61,7 +61,7 @@ class Numerics(Model):
     """Knobs that trade accuracy for time; left out, fidelity sets them."""
 
     steps: int | None = key(None, "steps of loading: fewer means heavier scaled masses, so more inertia", gt=100)
-    damping_ratio: float = key(1.0, "power of the adaptive damping over the rate of kinetic energy", gt=0)
+    damping_ratio: float = key(0.5, "power of the adaptive damping over the rate of kinetic energy", gt=0)
     consolidation_tolerance: float = key(1e-3, "unbalanced over mean zone force that ends consolidation", gt=0)
     energy_limit: float = key(0.05, "largest error of the energy ledger over the work done", gt=0)
 

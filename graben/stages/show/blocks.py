@@ -1,0 +1,55 @@
+"""Picture of a run of blocks: the last state with its stress and open joints, and stress against strain."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def draw(dataset: Any, figure: Any) -> None:
+    """Blocks at the last state coloured by vertical stress; wall stress and averaged lateral stress over strain."""
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
+    x = dataset.vertex_position.values + dataset.displacement.values[-1]
+    stress = -dataset.zone_stress.values[-1, :, 1] / 1e6
+    field = PolyCollection(x[dataset.zone_vertex.values], array=stress, cmap="viridis", edgecolors="none")
+    field.set_clim(0.0, max(float(np.percentile(stress, 97)), 1e-6))
+    left.add_collection(field)
+    ends = np.cumsum(dataset.block_corner_count.values)[:-1]
+    rings = np.split(x[dataset.block_corner.values], ends)
+    left.add_collection(PolyCollection(rings, facecolors="none", edgecolors="0.15", linewidths=0.4))
+    count = dataset.contact_count.values
+    last = slice(int(count[:-1].sum()), int(count.sum()))
+    sliding = dataset.contact_state.values[last] == 1
+    half = 0.5 * dataset.contact_length.values[last, None] * dataset.contact_tangent.values[last]
+    middle = dataset.contact_position.values[last]
+    segments = np.stack([middle - half, middle + half], axis=1)[sliding]
+    left.add_collection(LineCollection(segments, colors="crimson", linewidths=1.2))
+    left.autoscale()
+    left.set_aspect("equal")
+    left.set_xlabel("x, m")
+    left.set_ylabel("y, m")
+    left.set_title(f"t = {float(dataset.time[-1]):.3g} s; sliding joints red")
+    figure.colorbar(field, ax=left, label="vertical compression, MPa", shrink=0.6)
+
+    outline = dataset.outline.values
+    size = np.ptp(outline, axis=0)
+    top = int(np.argmax(0.5 * (outline + np.roll(outline, -1, axis=0))[:, 1]))
+    held = np.abs(dataset.vertex_position.values[:, 1] - outline[:, 1].max()) < 1e-3 * size[1]
+    strain = -dataset.displacement.values[:, held, 1].mean(axis=1) / size[1] * 100.0
+    right.plot(strain, -dataset.wall_reaction.values[:, top, 1] / size[0] / 1e6, label="top wall")
+    p = dataset.vertex_position.values[dataset.zone_vertex.values]
+    d1, d2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    area = 0.5 * (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0])
+    inside = np.hypot(*(p.mean(axis=1) - outline.mean(axis=0)).T) < 0.4 * size.min()
+    if inside.any():
+        mean = np.average(dataset.zone_stress.values[:, inside], axis=1, weights=area[inside])
+        right.plot(strain, -mean[:, 1] / 1e6, label="zones inside, vertical")
+        right.plot(strain, -mean[:, 0] / 1e6, label="zones inside, lateral")
+    right.axhline(-float(dataset.confining_stress) / 1e6, color="0.6", ls=":", label="confinement")
+    right.set_xlabel("nominal axial strain, %")
+    right.set_ylabel("compression, MPa")
+    right.legend(frameon=False)
+    figure.suptitle(f"{dataset.sizes['block']} blocks, {dataset.sizes['zone']} zones")

@@ -1,0 +1,144 @@
+"""dem-run on blocks: the artifact, its VTK files, determinism, and what a failed run leaves."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray
+
+from graben.mechanics.failure import NumericsFailed
+from graben.schemas.artifact import check_artifact, read_artifact
+from graben.schemas.faults import BadInput
+from graben.stages import dem_run, picture
+
+SCENE = """
+kind = "blocks"
+seed = 2
+[domain]
+width = "2 m"
+height = "2 m"
+[loading]
+confining_pressure = "0.5 MPa"
+speed = "0.2 mm/s"
+states = 6
+[numerics]
+steps = 4000
+"""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    path = tmp_path_factory.mktemp("blocks") / "scene.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def finished(scene):
+    output = scene.with_name("run.nc")
+    told = []
+    headline = dem_run.run(scene, output, progress=lambda f, m: told.append((f, m)))
+    return output, headline, told
+
+
+def test_artifact_holds_what_its_layout_says(finished):
+    output, headline, told = finished
+    assert check_artifact(output) == []
+    d = read_artifact(output, "blocks")
+    assert d.sizes["time"] == 6
+    assert d.sizes["vertex"] == d.sizes["corner"] == int(d.block_corner_count.sum())
+    assert d.sizes["contact"] == int(d.contact_count.sum())
+    assert float(d.time[-1]) == pytest.approx(100.0)
+    assert float(d.confining_stress) == -0.5e6
+    assert float(d.block_area.sum()) == pytest.approx(4.0)
+    assert not d.displacement[0].values.any()
+    # At the start the specimen carries the consolidation stress.
+    area_mean = np.average(d.zone_stress[0], axis=0, weights=_zone_area(d))
+    assert area_mean[:2] == pytest.approx([-0.5e6, -0.25e6], rel=0.03)
+    assert float(d.wall_reaction[0, 0, 1]) == pytest.approx(0.25e6 * 2.0, rel=0.02)
+    assert set(np.unique(d.contact_state)) <= {0, 1, 2, 3}
+    cost = json.loads(d.attrs["cost"])
+    assert cost["zone_steps"] > 0
+    assert cost["energy_error"] < 0.02
+    assert headline["blocks"] == d.sizes["block"]
+    assert headline["peak_wall_stress_pa"] < -1e6
+    json.dumps(headline)
+    fractions = [f for f, _ in told]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+
+
+def _zone_area(d):
+    p = d.vertex_position.values[d.zone_vertex.values]
+    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    return 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def test_averaged_stress_equals_boundary_forces(finished):
+    d = read_artifact(finished[0], "blocks")
+    for k in (0, 3):
+        x = d.vertex_position.values + d.displacement.values[k]
+        by_forces = np.einsum("vi,vj->ij", x, d.boundary_force.values[k])
+        by_zones = np.einsum("z,zc->c", _zone_area(d), d.zone_stress.values[k])
+        assert by_forces[1, 1] == pytest.approx(by_zones[1], rel=0.05)
+        assert by_forces[0, 0] == pytest.approx(by_zones[0], rel=0.05)
+
+
+def test_vtk_opens_with_the_promised_fields(finished):
+    import pyvista
+
+    output = finished[0]
+    zones = pyvista.get_reader(output.with_suffix(".pvd"))
+    assert len(zones.time_values) == 6
+    zones.set_active_time_value(zones.time_values[-1])
+    grid = zones.read()[0]
+    assert {"displacement", "velocity", "boundary_force"} <= set(grid.point_data)
+    assert {"stress", "stress_major_compressive", "stress_minor_compressive", "block"} <= set(grid.cell_data)
+    assert np.all(grid["stress_major_compressive"] <= grid["stress_minor_compressive"])
+    joints = pyvista.get_reader(output.with_name("run-joints.pvd"))
+    joints.set_active_time_value(joints.time_values[-1])
+    lines = joints.read()[0]
+    assert {"state", "slip", "opening", "normal_stress", "shear_stress", "force"} <= set(lines.cell_data)
+
+
+def test_same_scene_same_arrays(scene, finished):
+    again = scene.with_name("again.nc")
+    dem_run.run(scene, again, overrides=["output.vtk=false"])
+    assert not again.with_suffix(".pvd").exists()
+    with xarray.open_dataset(finished[0]) as a, xarray.open_dataset(again) as b:
+        for name in a.variables:
+            assert np.array_equal(a[name].values, b[name].values), name
+
+
+def test_picture(finished):
+    output = finished[0].with_name("run.png")
+    picture.run(finished[0], output)
+    assert output.stat().st_size > 10_000
+
+
+def test_failed_run_keeps_its_last_states(scene):
+    output = scene.with_name("failed.nc")
+    with pytest.raises(NumericsFailed, match="energy error"):
+        dem_run.run(scene, output, overrides=["numerics.energy_limit=1e-9"])
+    assert not output.exists()
+    with xarray.open_dataset(output.with_name("failed.partial.nc")) as d:
+        assert d.sizes["time"] >= 1
+
+
+@pytest.mark.parametrize(
+    ("setting", "key"),
+    [
+        ('joints.normal_stiffness="-1 GPa/m"', "joints.normal_stiffness"),
+        ('rock.young="65 GPa/m"', "rock.young"),
+        ('tessellation.edge="3 m"', "tessellation.edge"),
+        ('tessellation.rounding="0.3 m"', "tessellation.rounding"),
+        ('loading.speed="1 m/s"', "one half"),
+        ("loading.sped=1", "loading.sped"),
+    ],
+)
+def test_bad_scenes_are_refused(scene, setting, key):
+    output = scene.with_name("never.nc")
+    with pytest.raises(BadInput) as refused:
+        dem_run.run(scene, output, overrides=[setting])
+    assert any(key in str(f) for f in refused.value.faults)
+    assert not output.exists()
