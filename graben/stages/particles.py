@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from graben.mechanics.particles.bed import HISTORY, Bed, BedRecipe, make_bed
+from graben.mechanics.failure import NumericsFailed
+from graben.mechanics.particles.bed import HISTORY, Bed, BedFailed, BedRecipe, Snapshot, make_bed
 from graben.mechanics.particles.law import LinearLaw
 from graben.mechanics.particles.sampling import interval_over_areas, interval_over_beds
 from graben.schemas.artifact import write_artifact
 from graben.schemas.faults import BadInput, Fault
 from graben.schemas.layouts.particles import LAYOUT
 from graben.schemas.scenes.particles import ParticlesScene
-from graben.schemas.vtk import VtuSeries
+from graben.schemas.vtk import VtuSeries, write_vtu
 from graben.stages.record import Progress, Record, silent
 
 # (time step over critical, kinetic energy at rest, unbalanced force ratio): docs/dem-run-particles.md has the trade
@@ -31,7 +32,8 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
 
     Raises
     ------
-    BadInput : the mechanics refuse the scene; NumericsFailed : a bed blew up or did not come to rest
+    BadInput : the mechanics refuse the scene
+    NumericsFailed : a bed blew up or did not come to rest; NAME.last-good.vtu is beside the output
     """
     record = Record.begin(scene)
     try:
@@ -39,6 +41,12 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
         beds = [make_bed(law, recipe, scene.seed + b, _part(progress, b, scene.beds)) for b in range(scene.beds)]
     except ValueError as error:
         raise BadInput(Fault(str(scene.source.path), "", "", f"a scene that can be run ({error})")) from error
+    except BedFailed as failure:
+        kept = _write_last_good(output, failure.last_good)
+        raise NumericsFailed(
+            failure.what, where=failure.where, step=failure.step,
+            advice=f"{failure.advice}; the last good state is in {kept}",
+        ) from None  # fmt: skip
 
     arrays = _arrays(scene, law, beds)
     record.cost |= {
@@ -186,6 +194,13 @@ def _arrays(scene: ParticlesScene, law: LinearLaw, beds: list[Bed]) -> dict[str,
         "sample_bed": np.repeat(np.arange(len(beds)), [len(b.history) for b in beds]),
         **{name: history[:, i] for i, name in enumerate(HISTORY)},
     }
+
+
+def _write_last_good(output: Path, state: Snapshot) -> Path:
+    path = output.with_name(f"{output.stem}.last-good.vtu")
+    data = {"radius": state.radius, "class": state.kind, "velocity": state.velocity}
+    write_vtu(path, state.position, {"vertex": np.arange(len(state.radius))[:, None]}, data)
+    return path
 
 
 def _write_vtk(output: Path, law: LinearLaw, bed: Bed) -> None:

@@ -135,9 +135,13 @@ def test_existing_output_is_kept(made):
     assert (made / "bed.nc").read_bytes() == before
 
 
-def test_failed_numerics_exit_with_3_and_leave_no_output(made, tmp_path):
+def test_failed_numerics_exit_with_3_and_keep_the_last_good_state(made, tmp_path):
+    import pyvista
+
     arguments = [str(made / "bed.toml"), "-o", str(tmp_path / "out.nc"), "--set", "numerics.max_steps=400"]
     result = CliRunner().invoke(main, arguments)
     assert result.exit_code == 3
     assert "come to rest" in result.stderr
+    grid = pyvista.read(tmp_path / "out.last-good.vtu")
+    assert np.isfinite(grid.points).all() and set(grid.point_data.keys()) == {"radius", "class", "velocity"}
     assert not (tmp_path / "out.nc").exists()

@@ -105,6 +105,25 @@ def numbers(law: LinearLaw, recipe: BedRecipe) -> Ints:
     return count
 
 
+@dataclass(frozen=True)
+class Snapshot:
+    """Where all grains were, in the order of insertion: time s, position and velocity (n, 3), radius, kind (n,)."""
+
+    time: float
+    position: Floats
+    velocity: Floats
+    radius: Floats
+    kind: Ints
+
+
+class BedFailed(NumericsFailed):
+    """A bed that could not go on; `last_good` is its state at the last sample that passed every check."""
+
+    def __init__(self, failure: NumericsFailed, last_good: Snapshot) -> None:
+        super().__init__(failure.what, where=failure.where, step=failure.step, advice=failure.advice)
+        self.last_good = last_good
+
+
 class _Run:
     """One bed under way: the assembly, its history and its checks."""
 
@@ -131,6 +150,11 @@ class _Run:
         self.energy_scale = abs(self.box.energy()["potential"])
         self.energy_error = 0.0
         self.over = 0.0
+        self.last_good = self.snapshot()
+
+    def snapshot(self) -> Snapshot:
+        box, kind = self.box, self.insertion_kind
+        return Snapshot(box.time, box.by_identity(box.x), box.by_identity(box.v), box.law.radius[kind], kind)
 
     def sample(self) -> Survey:
         box = self.box
@@ -156,15 +180,20 @@ class _Run:
                  "piston_push": s.piston_push, "piston_height": box.place[motion.PISTON],
                  "floor_contacts": float(np.count_nonzero(floor_force))}  # fmt: skip
         self.rows.append([known[name] for name in HISTORY])
+        self.last_good = self.snapshot()
         return s
 
-    def until(self, phase: str, quiet: Callable[[Survey], bool], fraction: float, chunk: int = 200) -> None:
-        """Run in chunks until `quiet`; two samples in a row must agree."""
-        calm = 0
+    def until(
+        self, phase: str, quiet: Callable[[Survey], bool], share: tuple[float, float], chunk: int = 200
+    ) -> None:
+        """Run in chunks until `quiet`; two samples in a row must agree. share: of the progress of the run."""
+        calm = chunks = 0
         while calm < 2:
             self.box.advance(chunk)
             s = self.sample()
             calm = calm + 1 if quiet(s) else 0
+            chunks += 1
+            fraction = share[0] + (share[1] - share[0]) * (1.0 - np.exp(-chunks / 60.0))  # its end is not known
             self.progress(fraction, f"{phase}: unbalanced force {s.unbalanced:.2e}, kinetic {s.kinetic:.2e} J")
             if self.box.steps > self.recipe.max_steps:
                 raise NumericsFailed(
@@ -184,11 +213,21 @@ def make_bed(
     """Pour, settle, shake (if asked), press and quench one bed.
 
     Returns the bed at rest; raises ValueError for an impossible recipe and NumericsFailed when the run blows up,
-    loses energy balance, or does not come to rest within recipe.max_steps.
+    loses energy balance, or does not come to rest within recipe.max_steps (as BedFailed, with the last good state).
     """
     if not recipe.pressure > 0.0 or not recipe.gravity > 0.0:
         raise ValueError(f"expected pressure > 0 and gravity > 0, found {recipe.pressure}, {recipe.gravity}")
+    if recipe.shakes > 0 and not (recipe.shake_amplitude > 0.0 and recipe.shake_frequency > 0.0):
+        raise ValueError("shaking: expected amplitude > 0 and frequency > 0")
     run = _Run(law, recipe, seed, progress)
+    try:
+        return _finish(run, law, recipe)
+    except NumericsFailed as failure:
+        raise BedFailed(failure, run.last_good) from None
+
+
+def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
+    """All phases after insertion."""
     box = run.box
     small = float(law.radius.min())
     slow = recipe.rest * recipe.gravity * small  # kinetic energy per mass of a grain at rest
@@ -198,36 +237,35 @@ def make_bed(
     def resting(s: Survey) -> bool:
         return s.kinetic < slow * run.mass and abs(s.floor_push - weight) < 0.02 * weight
 
-    run.until("settled", resting, 0.1)
+    run.until("settled", resting, (0.0, 0.5))
     if recipe.shakes > 0:
-        if not (recipe.shake_amplitude > 0.0 and recipe.shake_frequency > 0.0):
-            raise ValueError("shaking: expected amplitude > 0 and frequency > 0")
+        begun, length = box.time, recipe.shakes / recipe.shake_frequency
         box.shake_floor(recipe.shake_amplitude, recipe.shake_frequency)
-        steps = round(recipe.shakes / (recipe.shake_frequency * box.dt))
-        for done in range(0, steps, 500):
-            box.advance(min(500, steps - done))
+        while (left := round((begun + length - box.time) / box.dt)) > 0:  # the step may shorten on the way
+            box.advance(min(500, left))
             run.sample()
-            progress(0.4 + 0.1 * done / steps, f"shaking: {done * box.dt * recipe.shake_frequency:.0f} cycles")
+            done = (box.time - begun) / length
+            run.progress(0.5 + 0.1 * done, f"shaking: {done * recipe.shakes:.0f} cycles")
         box.shake_floor(0.0, 0.0)
-        run.until("shaken", resting, 0.5)
+        run.until("shaken", resting, (0.6, 0.7))
 
-    # the plate: as heavy as a tenth of the bed, or, under high pressure, as light as keeps the bed's own pace
+    # the plate is light, so that it follows the bed, and its dashpot is critical on the bed's stiffness
     top = float(np.max(box.x[:, 2] + box.radius))
     push = recipe.pressure * run.area
     plate_mass = 0.1 * run.mass
     bed_stiffness = mean_k * run.area / (2.0 * small) / top  # of a plate on a column of springs
     damping = 2.0 * np.sqrt(bed_stiffness * plate_mass)
-    pace = np.pi * top * np.sqrt((run.mass / 3.0 + plate_mass) / bed_stiffness) / top  # slowest half period, s
+    pace = np.pi * np.sqrt((run.mass / 3.0 + plate_mass) / bed_stiffness)  # half period of the slowest mode, s
     box.set_piston(top, plate_mass, damping, push, push / (recipe.ramp * pace))
 
     def pressed(s: Survey) -> bool:
         on = box.scalars[motion.PISTON_PUSH] >= push
         return on and abs(s.piston_push - push) < 0.01 * push and s.unbalanced < 10.0 * recipe.balance
 
-    run.until("pressed", pressed, 0.7)
+    run.until("pressed", pressed, (0.7, 0.9))
     # quench: drag that damps the slowest mode critically, until forces balance
     box.drive[motion.DRAG_RATE] = 2.0 * np.pi / (2.0 * pace)
-    run.until("quenched", lambda s: s.unbalanced < recipe.balance, 0.9)
+    run.until("quenched", lambda s: s.unbalanced < recipe.balance, (0.9, 1.0))
 
     s, floor_force, coordination = box.survey()
     pair, normal, contact_push = box.contacts()
