@@ -36,6 +36,7 @@ def _point(text: str, option: str) -> tuple[float, float]:
 @click.option("--deformed", is_flag=True, help="Measure area and strain in the outline's current shape.")
 @click.option("--chosen-at", type=int, default=0, help="Saved state at which blocks meet the REV (0: the first).")
 @click.option("--steps", "steps_picture", type=FILE, help="Also draw how the outline was found (.png, .pdf, .svg).")
+@click.option("--vtk", is_flag=True, help="Also write the outlines as they move (NAME.pvd, for ParaView).")
 @stage_options
 def main(
     session: Session,
@@ -46,6 +47,7 @@ def main(
     deformed: bool,
     chosen_at: int,
     steps_picture: Path | None,
+    vtk: bool,
     output: Path,
     overwrite: bool,
 ) -> None:
@@ -66,6 +68,7 @@ def main(
             deformed=deformed,
             chosen_at=chosen_at,
             steps_picture=steps_picture,
+            vtk=vtk,
             overwrite=overwrite,
             progress=progress,
         )

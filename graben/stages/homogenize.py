@@ -14,6 +14,7 @@ from graben.schemas.artifact import write_artifact
 from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import refuse_existing
 from graben.schemas.layouts.curves import LAYOUT
+from graben.schemas.vtk import VtuSeries
 from graben.stages.block_history import Run, read_run
 from graben.stages.record import Progress, Record, silent
 
@@ -48,6 +49,7 @@ def run(
     deformed: bool = False,
     chosen_at: int = 0,
     steps_picture: Path | None = None,
+    vtk: bool = False,
     overwrite: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
@@ -62,6 +64,7 @@ def run(
     deformed : measure area and strain in the current shape of the outline
     chosen_at : saved state at which blocks are said to meet the REV (0: the first)
     steps_picture : also draw the nine steps of Y 2.3 for the first path
+    vtk : also write the outlines as they move, NAME.pvd
 
     Returns
     -------
@@ -98,6 +101,8 @@ def run(
         from graben.stages.show.outline_steps import save_steps
 
         save_steps(steps_picture, jobs[0][0].history, averages[0].outline, jobs[0][1])
+    if vtk:
+        _write_vtk(output, jobs, averages)
     return {"paths": [_headline(str(arrays["path_name"][k]), j, a) for k, (j, a) in enumerate(zip(jobs, averages))]}
 
 
@@ -168,6 +173,36 @@ def curve_arrays(jobs: Sequence[tuple[Run, Rev]], averages: Sequence[Average]) -
     for name in (*_TENSORS, *_SCALARS):
         arrays[name] = padded([getattr(a, name) for a in averages])
     return arrays
+
+
+def _write_vtk(output: Path, jobs: Sequence[tuple[Run, Rev]], averages: Sequence[Average]) -> None:
+    """Outlines of all paths as closed lines, state by state; each line carries the averages of its path."""
+    series = VtuSeries(output)
+    moving = [a.outline.follow(j.history.current) for (j, _), a in zip(jobs, averages)]
+    sizes = [nodes.shape[1] for nodes in moving]
+    starts = np.concatenate([[0], np.cumsum(sizes)])
+    lines = np.concatenate(
+        [
+            np.stack([first + np.arange(n), first + np.roll(np.arange(n), -1)], axis=1)
+            for first, n in zip(starts, sizes)
+        ]
+    )
+    longest = max(range(len(jobs)), key=lambda k: moving[k].shape[0])
+    for step, time in enumerate(jobs[longest][0].history.time):
+        # A run that ended earlier keeps its last state.
+        now = [min(step, nodes.shape[0] - 1) for nodes in moving]
+        tensors = {}
+        for name in ("stress", "strain"):
+            values = np.array([getattr(a, name)[k] for a, k in zip(averages, now)])
+            tensors[name] = np.repeat(np.hstack([values, np.zeros((len(now), 2))]), sizes, axis=0)
+        series.add(
+            float(time),
+            np.concatenate([nodes[k] for nodes, k in zip(moving, now)]),
+            {"line": lines},
+            None,
+            {"path": np.repeat(np.arange(len(now)), sizes), **tensors},
+        )
+    series.close()
 
 
 def _boundary_difference(a: Average) -> float:

@@ -135,6 +135,21 @@ def test_polygon_and_the_picture_of_the_steps(folder, tmp_path):
     assert (tmp_path / "steps.png").stat().st_size > 20_000
 
 
+def test_outlines_for_paraview(folder, tmp_path):
+    import pyvista
+
+    homogenize.run([folder / "dem0.nc", folder / "dem1.nc"], tmp_path / "c.nc", radii=[1.5], vtk=True)
+    data = read_artifact(tmp_path / "c.nc", "curves")
+    reader = pyvista.get_reader(str(tmp_path / "c.pvd"))
+    assert np.allclose(reader.time_values, data["time"][0])
+    reader.set_active_time_value(reader.time_values[6])
+    grid = reader.read()[0]
+    assert set(grid.cell_data) == {"path", "stress", "strain"}
+    assert np.allclose(grid.cell_data["stress"][-1, :4], data["stress"][1, 6])
+    length = np.linalg.norm(np.diff(grid.points[grid.cells.reshape(-1, 3)[:, 1:]], axis=1), axis=-1).sum()
+    assert 2 * 2 * np.pi * 1.5 < length < 2 * 2 * np.pi * 3.0
+
+
 def test_every_fault_is_named_and_nothing_written(folder, tmp_path):
     out = tmp_path / "x.nc"
     with pytest.raises(BadInput, match="inside the model") as caught:

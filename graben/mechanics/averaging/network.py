@@ -191,7 +191,7 @@ def _facing(
     position: Floats, edge: Ints, edge_block: Ints, vector: Floats, length: Floats, tolerance: float
 ) -> tuple[Ints, Ints, Floats]:
     """Pairs of edges that face each other: edges (n,), (n,), and the interval of overlap on each, (n, 2, 2) m."""
-    reach = 2.0 * float(np.median(length))
+    reach = float(np.median(length))
     count = np.maximum(1, np.ceil(length / reach).astype(np.int64))
     parent = np.repeat(np.arange(edge.shape[0]), count)
     rank = np.arange(parent.size) - np.repeat(np.cumsum(count) - count, count)
