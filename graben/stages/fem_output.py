@@ -10,6 +10,7 @@ import numpy as np
 
 from graben.mechanics.continuum.body import Body, State
 from graben.mechanics.continuum.march import March
+from graben.mechanics.continuum.newton import Step
 from graben.mechanics.continuum.surface import free_surface
 from graben.schemas.artifact import write_artifact
 from graben.schemas.layouts.fem import LAYOUT
@@ -26,28 +27,39 @@ class History:
     scene : gives the times to save at
     settled : the equilibrium under gravity, saved as the first state
     settling : (2 n,) weights whose product with a displacement is the mean settlement of the loaded segment, m
+    length : length of that segment, m
     pressure : pressure of the first rising load at time 0, Pa
     """
 
     def __init__(
-        self, scene: FemScene, body: Body, settled: March, settling: np.ndarray, pressure: float
+        self, scene: FemScene, settled: March, settling: np.ndarray, length: float, pressure: float
     ) -> None:
         self._every, self._end = scene.stepping.save_every, scene.stepping.end
-        self._settling, self._start = settling, settled.state.displacement
+        self._settling, self._length, self._start = settling, length, settled.state.displacement
         self._latest: tuple[float, State, np.ndarray] = (0.0, settled.state, settled.force)
-        self._last_pressure = pressure
         self.saved: list[tuple[float, State, np.ndarray]] = [self._latest]
         self.previous: State | None = None
         self.time, self.pressure, self.settlement, self.iterations = [0.0], [pressure], [0.0], [0]
+        self.carried = [pressure]
 
-    def add(self, time: float, state: State, force: np.ndarray, iterations: int, pressure: float) -> None:
-        """Take in an accepted step; keep its state if it falls on a time to save."""
+    def add(self, time: float, state: State, force: np.ndarray, step: Step, pressure: float) -> None:
+        """Take in an accepted step; keep its state if it falls on a time to save.
+
+        The pressure that the law carries is what remains of the applied one when the power of the viscous forces is
+        taken off that of the pressure.
+        """
         self.previous = self._latest[1]
+        overload = 0.0
+        if step.drag is not None:
+            increment = state.displacement - self.previous.displacement
+            moved = float(self._settling @ increment)
+            overload = float(step.drag @ increment) / (self._length * moved) if moved > 0 else 0.0
+        self.carried.append(pressure - overload)
         self._latest = (time, state, force)
         self.time.append(time)
         self.pressure.append(pressure)
         self.settlement.append(float(self._settling @ (state.displacement - self._start)))
-        self.iterations.append(iterations)
+        self.iterations.append(step.iterations)
         whole = round(time / self._every)
         if abs(time - whole * self._every) < 1e-9 * self._end:
             self.saved.append(self._latest)
@@ -116,6 +128,7 @@ def write_run(
         "surface_displacement": movement[:, surface],
         "step_time": history.time,
         "step_pressure": history.pressure,
+        "step_carried_pressure": history.carried,
         "step_settlement": history.settlement,
         "step_iterations": history.iterations,
     }

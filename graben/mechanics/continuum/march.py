@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from graben.mechanics.continuum.body import Body, State
-from graben.mechanics.continuum.newton import NewtonOptions, Step, equilibrate
+from graben.mechanics.continuum.newton import Drag, NewtonOptions, Step, equilibrate
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class March:
 
     Attributes
     ----------
-    time, state, force : the last equilibrium
+    time, state, force, drag : the last equilibrium, its internal and its viscous forces
     complete : whether the end time was reached
     reason : why the last attempt failed (empty when complete)
     iterations, residuals : per accepted step: factorisations and their residuals
@@ -50,6 +50,7 @@ class March:
     time: float
     state: State
     force: np.ndarray
+    drag: np.ndarray
     complete: bool = False
     reason: str = ""
     iterations: list[int] = field(default_factory=list)
@@ -77,8 +78,8 @@ def march(
     *,
     prescribed: Callable[[float], np.ndarray] | None = None,
     save_times: np.ndarray | None = None,
-    drag: Callable[[float], np.ndarray] | None = None,
-    accepted: Callable[[float, State, np.ndarray, Step], None] | None = None,
+    relaxation: float = 0.0,
+    accepted: Callable[[float, State, np.ndarray, Step], str | None] | None = None,
 ) -> March:
     """Follow the load history from `begin` to `end`, s.
 
@@ -87,8 +88,9 @@ def march(
     external : nodal loads (2 n,), N/m, at a time
     prescribed : displacement of `body.fixed`, m, at a time; None: stays as it is in `start`
     save_times : times that a step must end on
-    drag : resistance (2 n,) per displacement increment for a step of the given length (viscous stabilisation)
-    accepted : called after each equilibrium with time, state, internal forces and the step
+    relaxation : relaxation time, s, of the viscous stabilisation (see `newton.Drag`); 0: none
+    accepted : called after each equilibrium with time, state, internal forces and the step; a text that it
+        returns ends the march, not complete, for that reason
 
     Returns
     -------
@@ -100,9 +102,13 @@ def march(
     stops = np.unique(stops[(stops > begin) & (stops <= end)])
     # At rest the forces that balance the stresses are the internal ones: no work is missed at the start.
     force = body.respond(start, np.zeros(body.pattern.size), False).force
-    run = March(begin, start, force)
+    run = March(begin, start, force, np.zeros_like(force))
     load = external(begin)
     length, last_length = steps.first, 0.0
+    elastic = None
+    if relaxation > 0:
+        elastic = body.respond(body.untouched(), np.zeros(body.pattern.size), True).values
+        elastic_matrix = body.pattern.matrix(elastic)
     last_increment: np.ndarray | None = None
     while run.time < end:
         stop = float(stops[np.searchsorted(stops, run.time, side="right")])
@@ -115,7 +121,7 @@ def march(
         if steps.extrapolate and last_increment is not None:
             guess = last_increment * (taken / last_length)
         new_load = external(target)
-        resist = None if drag is None else drag(taken)
+        resist = None if elastic is None else Drag(elastic_matrix, elastic, relaxation / taken)
         step = equilibrate(body, run.state, new_load, supports(target), newton, guess, resist)
         run.factorisations += step.iterations
         if not step.converged and guess is not None:
@@ -130,13 +136,15 @@ def march(
                 return run
             continue
         increment = step.state.displacement - run.state.displacement
-        _book(run, body, step, increment, load, new_load, resist)
+        _book(run, body, step, increment, load, new_load)
         last_increment, last_length = increment, taken
         run.time, run.state, run.force, load = target, step.state, step.force, new_load
         run.iterations.append(step.iterations)
         run.residuals.append(step.residuals)
-        if accepted is not None:
-            accepted(run.time, run.state, run.force, step)
+        ended = accepted(run.time, run.state, run.force, step) if accepted is not None else None
+        if ended:
+            run.reason = ended
+            return run
         if step.iterations <= steps.easy:
             length = min(1.5 * max(length, taken), steps.largest)
         elif step.iterations > steps.hard:
@@ -152,12 +160,12 @@ def _book(
     increment: np.ndarray,
     load: np.ndarray,
     new_load: np.ndarray,
-    resist: np.ndarray | None,
 ) -> None:
-    """Add a step to the energy ledger: loads on free, supports on fixed degrees of freedom."""
+    """Add a step to the energy ledger: loads on free, supports on fixed degrees of freedom; trapezoidal."""
+    resist = np.zeros_like(load) if step.drag is None else 0.5 * (run.drag + step.drag)
     mean = 0.5 * (load + new_load)
-    mean[body.fixed] = 0.5 * (run.force + step.force)[body.fixed]
+    mean[body.fixed] = (0.5 * (run.force + step.force) + resist)[body.fixed]
     run.external_work += float(mean @ increment)
     run.internal_work += body.internal_work(run.state, step.state)
-    if resist is not None:
-        run.drag_work += 0.5 * float((resist * increment) @ increment)
+    run.drag_work += float(resist @ increment)
+    run.drag = resist if step.drag is None else step.drag

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 from graben.mechanics.continuum.body import Body, Response, State
@@ -27,6 +28,25 @@ class NewtonOptions:
 
 
 @dataclass(frozen=True)
+class Drag:
+    """Viscous stabilisation: a Kelvin-Voigt stress `relaxation * C_elastic : strain rate` beside the law's own.
+
+    Attributes
+    ----------
+    values : elastic stiffness in the value array of the body's pattern
+    factor : relaxation time over the length of the step
+    """
+
+    matrix: sp.csc_matrix
+    values: np.ndarray
+    factor: float
+
+    def force(self, increment: np.ndarray) -> np.ndarray:
+        """Viscous nodal forces (2 n,), N/m, against a displacement increment."""
+        return self.factor * (self.matrix @ increment)
+
+
+@dataclass(frozen=True)
 class Step:
     """Outcome of one step.
 
@@ -36,6 +56,7 @@ class Step:
     force : (2 n,) internal forces of `state` (reactions at fixed degrees of freedom), N/m
     residuals : relative residual before each factorisation, and the last
     reason : "" when converged, else what went wrong
+    drag : (2 n,) viscous forces, N/m, where the step was stabilised
     """
 
     state: State
@@ -43,6 +64,7 @@ class Step:
     residuals: tuple[float, ...]
     converged: bool
     reason: str = ""
+    drag: np.ndarray | None = None
 
     @property
     def iterations(self) -> int:
@@ -57,7 +79,7 @@ def equilibrate(
     prescribed: np.ndarray,
     options: NewtonOptions,
     guess: np.ndarray | None = None,
-    drag: np.ndarray | None = None,
+    drag: Drag | None = None,
 ) -> Step:
     """Find the state in equilibrium with `external` from the converged state `old`.
 
@@ -66,8 +88,7 @@ def equilibrate(
     external : (2 n,) nodal loads, N/m
     prescribed : displacement of `body.fixed`, m
     guess : (2 n,) increment to start from (an extrapolation of the last one); None: zero
-    drag : (2 n,) resistance per displacement increment, N/m per m, where a scene asks for viscous
-        stabilisation; None: none
+    drag : viscous stabilisation, where a scene asks for it
     """
     fixed_move = prescribed - old.displacement[body.fixed]
     increment = np.zeros(body.pattern.size)
@@ -100,7 +121,8 @@ def equilibrate(
         moved = not np.any(move)
         if moved and residuals[-1] <= options.tolerance:
             new = State(old.displacement + increment, response.stress, response.internal)
-            return Step(new, response.force, tuple(residuals), True)
+            viscous = None if drag is None else drag.force(increment)
+            return Step(new, response.force, tuple(residuals), True, drag=viscous)
         if residuals[-1] < 0.999 * best or not moved:
             best, since_best = residuals[-1], 0
         else:
@@ -118,19 +140,19 @@ def equilibrate(
 
 
 def _unbalanced(
-    external: np.ndarray, response: Response, increment: np.ndarray, drag: np.ndarray | None
+    external: np.ndarray, response: Response, increment: np.ndarray, drag: Drag | None
 ) -> np.ndarray:
     unbalanced = external - response.force
-    return unbalanced if drag is None else unbalanced - drag * increment
+    return unbalanced if drag is None else unbalanced - drag.force(increment)
 
 
 def _solve(
-    body: Body, values: np.ndarray, unbalanced: np.ndarray, move: np.ndarray, drag: np.ndarray | None
+    body: Body, values: np.ndarray, unbalanced: np.ndarray, move: np.ndarray, drag: Drag | None
 ) -> np.ndarray | None:
     """Correction (2 n,) of the displacement increment; None when the matrix is singular."""
-    matrix = body.free_block.matrix(values)
     if drag is not None:
-        matrix.setdiag(matrix.diagonal() + drag[body.free])
+        values = values + drag.factor * drag.values
+    matrix = body.free_block.matrix(values)
     right = unbalanced[body.free]
     if np.any(move):
         right = right - body.coupling_block.matrix(values) @ move
@@ -158,7 +180,7 @@ def _line_search(
     increment: np.ndarray,
     correction: np.ndarray,
     external: np.ndarray,
-    drag: np.ndarray | None,
+    drag: Drag | None,
     norm: float,
     max_cuts: int,
 ) -> tuple[np.ndarray, Response]:

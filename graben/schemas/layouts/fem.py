@@ -69,6 +69,9 @@ LAYOUT = Layout(
         ),
         "step_time": Variable(("step",), "s", "load time of each accepted step"),
         "step_pressure": Variable(("step",), "Pa", "pressure of the first rising load"),
+        "step_carried_pressure": Variable(
+            ("step",), "Pa", "pressure without the part that viscous stabilisation carries"
+        ),
         "step_settlement": Variable(("step",), "m", "mean movement of its loaded segment into the body"),
         "step_iterations": Variable(("step",), "1", "factorisations of the step", dtype="i4"),
     },

@@ -54,18 +54,23 @@ _SLOPE_SUPPORTS: Any = [
 _SLOPE_LOADS: Any = [
     {"name": "backslope", "start": ["55 m", "50 m"], "end": ["60 m", "50 m"], "rate": "0.25 MPa/s"}
 ]
-# A stand-in for a jointed granite until a calibrated law is chained: --material FILE replaces it.
+# Y, table 4.2 (damage strains read as percent): a stand-in until a calibrated law is chained by --material FILE.
 _ROCK_MASS: Any = {
     "law": "drucker-prager",
     "parameters": {
-        "young_modulus": "1.9 GPa",
-        "poisson_ratio": 0.3,
-        "friction_angle": "50 deg",
-        "dilation_angle": "10 deg",
-        "hardening": "exponential",
-        "initial_yield": "0.2 MPa",
-        "hardening_gain": "1 MPa",
-        "hardening_rate": 300.0,
+        "young_modulus": "1.8 GPa",
+        "poisson_ratio": 0.15,
+        "friction_angle": "56 deg",
+        "dilation_angle": "22 deg",
+        "flow_stress_ratio": 0.81,
+        "hardening": "barcelona",
+        "initial_yield": "52 kPa",
+        "peak_yield": "3.1 MPa",
+        "strain_at_peak": 0.017,
+        "damage": "ductile",
+        "initiation_strain_050": 7.8e-5,
+        "initiation_strain_060": 3.0e-3,
+        "failure_displacement": "0.12 m",
     },
 }
 
@@ -95,7 +100,7 @@ class Mesh(Model):
     )
     outline: list[Point] = key(_SLOPE_OUTLINE, "paved: corner points of the polygon, in order")
     file: InputFile | None = key(None, "file: mesh file with 4-node quads (Gmsh, VTU, Abaqus, ...), coordinates in m")
-    draft_factor: float = key(2.4, "all sizes are multiplied by this at draft fidelity", ge=1)
+    draft_factor: float = key(2.7, "all sizes are multiplied by this at draft fidelity", ge=1)
     reference_factor: float = key(0.33, "all sizes are multiplied by this at reference fidelity", gt=0, le=1)
 
     @model_validator(mode="after")
@@ -148,6 +153,19 @@ class Stepping(Model):
     save_every: Time = key("4 s", "load time between saved states (the last state is always saved)", gt=0)
     tolerance: float = key(1e-6, "unbalanced force over the largest of loads and reactions", gt=0, lt=1e-2)
     max_iterations: int = key(20, "factorisations per step", ge=3)
+    relaxation: Time = key(
+        "0 s",
+        "viscous stabilisation, off at 0 s: a Kelvin-Voigt stress, this time times the elastic stiffness times the "
+        "strain rate, beside the law's own. It carries a march past states at which Newton finds no way",
+        ge=0,
+    )
+    overload: float = key(
+        0.02,
+        "with stabilisation: failure is declared once viscous stress carries more than this part of the pressure; "
+        "the failure load is the largest pressure that the law itself carried",
+        gt=0,
+        lt=1,
+    )
     extrapolate: bool = key(True, "start each step from the last increment (fewer iterations on a smooth path)")
 
     @model_validator(mode="after")

@@ -111,10 +111,15 @@ def test_damage_removes_material_and_sections_follow_what_remains() -> None:
     assert run.cost["removed_elements"] == gone.sum() > 0
     assert not np.isin(run.unloaded.faces, np.setdiff1d(mesh.cells[gone], mesh.cells[~gone])).any()
     living = ~gone
+    state = run.unloaded
     v = volume_ledger(
-        run.unloaded.points, np.concatenate([run.unloaded.faces, run.unloaded.supports]), float(run.unloaded.tip[0]), run.first_volumes[living].sum(),
-        run.unloaded.volumes[living].sum(), run.first_volumes[gone].sum(),
-    )  # fmt: skip
+        state.points,
+        np.concatenate([state.faces, state.supports]),
+        float(state.tip[0]),
+        run.first_volumes[living].sum(),
+        state.volumes[living].sum(),
+        run.first_volumes[gone].sum(),
+    )
     assert v.removed > 0 and abs(v.closure) < 1e-6
 
 
