@@ -115,5 +115,5 @@ def test_failure_keeps_the_last_good_state(scene: Path, tmp_path: Path) -> None:
 
 
 def test_output_that_exists_is_refused(done: tuple[Path, dict], scene: Path) -> None:
-    with pytest.raises(BadInput, match="out.nc"):
+    with pytest.raises(BadInput, match=r"out\.nc"):
         scratch.run(scene, done[0], overrides=SMALL)
