@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -61,6 +62,7 @@ def run(
     record = Record.begin(scene, inputs=inputs)
     centres = _centres(runs, scene)
     chunks = _chunks(runs, centres, scene)
+    before = _workers_cpu()
     samples = _sampled(chunks, scene.processes or os.cpu_count() or 1, progress)
     arrays = _arrays(runs, centres, samples, scene)
     criteria = Criteria(
@@ -92,7 +94,11 @@ def run(
         }
     arrays["independent_samples"] = independent
     arrays["recommended_radius"] = advice.radius or 0.0
-    record.cost |= {"samples": int(arrays["area"].size), "processes": scene.processes or os.cpu_count() or 1}
+    record.cost |= {
+        "samples": int(arrays["area"].size),
+        "processes": scene.processes or os.cpu_count() or 1,
+        "workers_cpu_s": _workers_cpu() - before,
+    }
     attributes = {
         "reason": advice.reason,
         "chosen_properties": ", ".join(scene.curves.properties),
@@ -108,6 +114,12 @@ def run(
         "samples": int(arrays["area"].size),
         "properties": [_row(name, c) for name, c in by_name.items()],
     }
+
+
+def _workers_cpu() -> float:
+    """CPU seconds of worker processes that have ended; cpu_s of the record counts this process only."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def _row(name: str, c: Convergence) -> dict[str, Any]:
