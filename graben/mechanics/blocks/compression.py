@@ -8,8 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from graben.mechanics.blocks import relaxation as rx
-from graben.mechanics.blocks.model import BlockModel
+from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.failure import NumericsFailed
+
+
+# Rest comes soonest with more damping than a moving wall should feel.
+_CONSOLIDATION_DAMPING = 1.0
 
 
 @dataclass(frozen=True)
@@ -51,10 +55,12 @@ def consolidate(
         model.press(b.edge_side == side, lateral)
     model.press(b.edge_side == sides.top, vertical)
     ratio = np.inf
+    damping, model.damping = model.damping, Damping(ratio=_CONSOLIDATION_DAMPING)
     for _ in range(0, limit, chunk):
         model.advance(chunk)
         ratio = model.unbalanced_ratio()
         if ratio < tolerance:
+            model.damping = damping
             return ratio
     raise NumericsFailed(
         f"unbalanced force ratio {ratio:.3g} (limit {tolerance:.3g})",

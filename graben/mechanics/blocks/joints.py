@@ -61,7 +61,7 @@ class Pairs(NamedTuple):
 X, Y, VX, VY, TX, TY, LENGTH, CHAMFER, COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
 
-@kernel
+@kernel(error_model="numpy")
 def node_motion(x, v, first, second, weight, follow, node):
     """Fill the node table (nodes, 8) from vertex positions x and velocities v (vertices, 2); CHAMFER stays."""
     for i in range(first.shape[0]):
@@ -83,7 +83,7 @@ def node_motion(x, v, first, second, weight, follow, node):
         node[i, LENGTH] = length
 
 
-@kernel
+@kernel(error_model="numpy")
 def scatter_nodes(fn, first, second, weight, force):
     """Hand the forces on contact nodes back to the vertices that they blend."""
     for i in range(first.shape[0]):
@@ -95,7 +95,7 @@ def scatter_nodes(fn, first, second, weight, force):
             force[b, d] += w * fn[i, d]
 
 
-@kernel
+@kernel(error_model="numpy")
 def _pressed_share(gap0, gap1, chamfer):
     """Share of the interval that a chamfer bears on: up to where the gap opens. 1 for plain edges.
 
@@ -107,8 +107,8 @@ def _pressed_share(gap0, gap1, chamfer):
     return abs(min(gap0, gap1)) / abs(gap1 - gap0)
 
 
-@kernel
-def _forget(pairs, c):
+@kernel(error_model="numpy")
+def forget(pairs, c):
     """An open contact remembers no stress; what slid stays, and so does the mark of a broken joint."""
     for k in range(2):
         pairs.shear[c, k] = 0.0
@@ -119,7 +119,7 @@ def _forget(pairs, c):
                 pairs.flag[c, k] = OPEN
 
 
-@kernel
+@kernel(error_model="numpy")
 def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
     """Stress update and forces of the active candidates; returns the pair that overlaps too much, or -1.
 
@@ -143,7 +143,7 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
         facing = 0.5 * (tx * tx + ty * ty) - 1.0
         if facing <= FACING_NONE:
             if pairs.live[c] == 1:
-                _forget(pairs, c)
+                forget(pairs, c)
                 pairs.live[c] = 0
             continue
         f2 = follow[f]
@@ -157,7 +157,7 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
         high = min(se, s0)
         if high <= low:
             if pairs.live[c] == 1:
-                _forget(pairs, c)
+                forget(pairs, c)
                 pairs.live[c] = 0
             continue
         # Heights along the normal n = (ty, -tx), which points out of edge e.
@@ -168,7 +168,7 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
         if apart and pairs.intact[c] == 0 and pairs.slip[c, 0] == 0.0 and pairs.slip[c, 1] == 0.0:
             # Most chamfers end here, before any root or division.
             if pairs.live[c] == 0 or pairs.flag[c, 0] != OPEN or pairs.flag[c, 1] != OPEN:
-                _forget(pairs, c)
+                forget(pairs, c)
                 pairs.live[c] = 1
             continue
         e2 = follow[e]
@@ -272,12 +272,13 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
     return -1
 
 
-@kernel
+@kernel(error_model="numpy")
 def contact_state(pairs, follow, node, joint, deepest, out, ints):
     """State of all touching candidates, for output. Returns (their number, stored joint energy [J/m]).
 
     out : (n, 11) position x, y [m]; force on the first edge x, y [N/m]; mean normal (tension positive) and shear
-    stress [Pa]; length [m]; mean net slip [m]; mean opening [m]; unit tangent x, y. ints : (n, 2) pair and state flag.
+    stress [Pa]; length [m]; mean net slip [m]; mean opening [m]; unit tangent x, y.
+    ints : (n, 2) pair and state flag.
     """
     count = 0
     stored = 0.0

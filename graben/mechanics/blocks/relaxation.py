@@ -68,7 +68,7 @@ class Motion(NamedTuple):
     drive: np.ndarray
 
 
-@kernel
+@kernel(error_model="numpy")
 def _moved(node, since):
     """Largest squared distance that a node moved."""
     largest = 0.0
@@ -82,7 +82,7 @@ def _moved(node, since):
     return largest
 
 
-@kernel
+@kernel(error_model="numpy")
 def advance(
     steps, skeleton, motion, pairs, joint, dt, skin, near, deepest, damping_ratio, damping_limit, local, fastest
 ):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from graben.mechanics.blocks.joints import FACING_NONE, LENGTH, OPEN, TX, TY, Pairs, X, Y
+from graben.mechanics.blocks.joints import FACING_NONE, LENGTH, OPEN, TX, TY, Pairs, X, Y, forget
 from graben.mechanics.compiled import kernel
 
 
-@kernel
+@kernel(error_model="numpy")
 def find_keys(node, follow, block, reach, deepest, low, cell, nx, ny, old_key, old_live):
     """Sorted keys of the edge pairs whose boxes, each grown by reach / 2, meet.
 
@@ -81,7 +81,7 @@ def find_keys(node, follow, block, reach, deepest, low, cell, nx, ny, old_key, o
     return np.sort(keys[:count])
 
 
-@kernel
+@kernel(error_model="numpy")
 def _middle_gap(node, follow, e, f):
     """Largest distance of either edge's ends in front of the other edge [m]; negative when behind."""
     gap = -1e300
@@ -99,7 +99,7 @@ def _middle_gap(node, follow, e, f):
     return gap
 
 
-@kernel
+@kernel(error_model="numpy")
 def carry_history(keys, nodes, old):
     """Candidate arrays for `keys`, with the history of those that were candidates before."""
     n = keys.shape[0]
@@ -132,21 +132,27 @@ def no_pairs() -> Pairs:
     return Pairs(i, i.copy(), i.copy(), f, f.copy(), np.empty((0, 2), dtype=np.int64), i.copy(), i.copy())
 
 
-@kernel
+@kernel(error_model="numpy")
 def choose_active(pairs, follow, node, reach, dilation, active):
     """Candidates that can touch before any node moves by reach / 2; the others sleep. Returns their number.
 
     A pair sleeps when it is too far apart along its normal or along its tangent, or turned away; what it remembers
     of shear is then wiped, as for any open contact. dilation : tangent; slid joints push before they overlap.
+    Active pairs come sorted by what they are now (closed, facing with a gap, beside each other, turned away), so that
+    branches of the contact kernel are taken in runs.
     """
-    count = 0
-    for c in range(pairs.key.shape[0]):
+    n = pairs.key.shape[0]
+    kind = np.empty(n, dtype=np.int64)
+    total = np.zeros(5, dtype=np.int64)
+    for c in range(n):
         e = pairs.first[c]
         f = pairs.second[c]
         facing = -(node[e, TX] * node[f, TX] + node[e, TY] * node[f, TY])
         slack = 2.0 * reach / min(node[e, LENGTH], node[f, LENGTH])
-        awake = facing > FACING_NONE - slack
-        if awake and facing > -0.9:
+        sort = 3
+        if facing <= FACING_NONE - slack:
+            sort = 4
+        elif facing > -0.9:
             scale = 1.0 / np.sqrt(2.0 + 2.0 * facing)
             tx = (node[e, TX] - node[f, TX]) * scale
             ty = (node[e, TY] - node[f, TY]) * scale
@@ -165,13 +171,26 @@ def choose_active(pairs, follow, node, reach, dilation, active):
             # A turn of the tangent shifts ends by at most their distance times the turn.
             far = reach * (1.0 + (abs(h0) + abs(h1)) / min(node[e, LENGTH], node[f, LENGTH]))
             if length < -2.0 * far or min(h0, h1) - max(0.0, rise) > 2.0 * far + held:
-                awake = False
-        if awake:
-            active[count] = c
-            count += 1
-        else:
-            for d in range(2):
-                pairs.shear[c, d] = 0.0
-                pairs.flag[c, d] = OPEN
+                sort = 4
+            elif facing <= FACING_NONE:
+                sort = 3
+            elif length <= 0.0:
+                sort = 2
+            elif pairs.flag[c, 0] >= OPEN and pairs.flag[c, 1] >= OPEN:
+                sort = 1
+            else:
+                sort = 0
+        if sort == 4:
+            forget(pairs, c)
             pairs.live[c] = 0
-    return count
+        kind[c] = sort
+        total[sort] += 1
+    place = np.zeros(5, dtype=np.int64)
+    for k in range(1, 5):
+        place[k] = place[k - 1] + total[k - 1]
+    for c in range(n):
+        k = kind[c]
+        if k < 4:
+            active[place[k]] = c
+            place[k] += 1
+    return n - total[4]

@@ -45,7 +45,7 @@ def stiffness_row_sums(gradient: np.ndarray, area: np.ndarray, lam: np.ndarray, 
     return rows.max(axis=2)
 
 
-@kernel
+@kernel(error_model="numpy")
 def zone_forces(x, triangles, gradient, area, lam, mu, force):
     """Add the forces of the zones on their vertices to `force` (vertices, 2) [N/m]."""
     for z in range(triangles.shape[0]):
