@@ -38,7 +38,9 @@ def mesh_of(scene: FemScene) -> QuadMesh:
     key = "mesh.outline" if mesh.method == "paved" else "mesh.patches"
     extent = np.ptp(shape, axis=0)
     if float(extent[0] * extent[1]) / size.size**2 > MOST_ELEMENTS:
-        raise BadInput(Fault(file, "mesh.size", f"{mesh.size:g} m", f"a size that gives fewer than {MOST_ELEMENTS} elements"))
+        raise BadInput(
+            Fault(file, "mesh.size", f"{mesh.size:g} m", f"a size that gives fewer than {MOST_ELEMENTS} elements")
+        )
     try:
         if mesh.method == "paved":
             return paved_mesh(shape, size)

@@ -31,9 +31,7 @@ class History:
     pressure : pressure of the first rising load at time 0, Pa
     """
 
-    def __init__(
-        self, scene: FemScene, settled: March, settling: np.ndarray, length: float, pressure: float
-    ) -> None:
+    def __init__(self, scene: FemScene, settled: March, settling: np.ndarray, length: float, pressure: float) -> None:
         self._every, self._end = scene.stepping.save_every, scene.stepping.end
         self._settling, self._length, self._start = settling, length, settled.state.displacement
         self._latest: tuple[float, State, np.ndarray] = (0.0, settled.state, settled.force)

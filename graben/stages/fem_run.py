@@ -213,9 +213,7 @@ def _load_up(
     )
 
 
-def _headline(
-    scene: FemScene, problem: Problem, settled: March, loaded: March, history: History
-) -> dict[str, Any]:
+def _headline(scene: FemScene, problem: Problem, settled: March, loaded: March, history: History) -> dict[str, Any]:
     pressure = problem.offset + problem.rate * loaded.time
     failed = not loaded.complete
     elastic = softest_stiffness(problem.body, settled.state)

@@ -57,9 +57,7 @@ def mapped_mesh(corners: np.ndarray, patches: np.ndarray, size: SizeField) -> Qu
         grid, inner = _grid(corners, patch, own, sides, nodes_t, first_on_side, total)
         points.append(inner)
         total += len(inner)
-        quads.append(
-            np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4)
-        )
+        quads.append(np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]], axis=-1).reshape(-1, 4))
     all_points, all_quads = np.concatenate(points), np.concatenate(quads)
     used, inverse = np.unique(all_quads, return_inverse=True)  # corners that no patch uses are dropped
     mesh = QuadMesh(all_points[used], np.ascontiguousarray(inverse.reshape(all_quads.shape)))

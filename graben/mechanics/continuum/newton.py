@@ -114,9 +114,7 @@ def equilibrate(
         unbalanced = _unbalanced(external, response, increment, drag)
         move = fixed_move - increment[body.fixed]
         norm = float(np.linalg.norm(unbalanced[body.free]))
-        scale = max(
-            float(np.linalg.norm(external)), float(np.linalg.norm(response.force[body.fixed])), 1e-300
-        )
+        scale = max(float(np.linalg.norm(external)), float(np.linalg.norm(response.force[body.fixed])), 1e-300)
         residuals.append(norm / scale if norm > 0 else 0.0)
         moved = not np.any(move)
         if moved and residuals[-1] <= options.tolerance:
@@ -139,9 +137,7 @@ def equilibrate(
         )
 
 
-def _unbalanced(
-    external: np.ndarray, response: Response, increment: np.ndarray, drag: Drag | None
-) -> np.ndarray:
+def _unbalanced(external: np.ndarray, response: Response, increment: np.ndarray, drag: Drag | None) -> np.ndarray:
     unbalanced = external - response.force
     return unbalanced if drag is None else unbalanced - drag.force(increment)
 
@@ -169,9 +165,7 @@ def _solve(
 
 def factorise(matrix: object) -> spla.SuperLU:
     """Sparse LU of a structurally symmetric matrix; a diagonal pivot is kept unless it is far too small."""
-    return spla.splu(
-        matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=1e-3, options={"SymmetricMode": True}
-    )
+    return spla.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=1e-3, options={"SymmetricMode": True})
 
 
 def _line_search(

@@ -1,8 +1,8 @@
 """Quads for any simple polygon: graded points, a Delaunay triangulation, and each triangle cut into three quads.
 
 Points are laid on the outline by the wanted size, inner points start on a triangular lattice thinned by the size
-field and are relaxed as a network of springs. Conforming on any outline and graded in all directions; the elements are
-rougher than those of a mapped mesh (angles near 60 and 120 degrees) and every node is met by 3 to 8 of them.
+field and are relaxed as a network of springs. Conforming on any outline and graded in all directions; the
+elements are rougher than those of a mapped mesh (angles near 60 and 120 degrees), 3 to 8 of them at a node.
 Deterministic: no random numbers.
 """
 
@@ -159,9 +159,7 @@ def _three_quads_each(points: np.ndarray, triangles: np.ndarray) -> QuadMesh:
     unique, inverse = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
     middle = len(points) + inverse.reshape(-1, 3)  # on the edge from corner i to corner i + 1
     centre = len(points) + len(unique) + np.arange(len(triangles))
-    quads = [
-        np.stack([triangles[:, i], middle[:, i], centre, middle[:, (i + 2) % 3]], axis=1) for i in range(3)
-    ]
+    quads = [np.stack([triangles[:, i], middle[:, i], centre, middle[:, (i + 2) % 3]], axis=1) for i in range(3)]
     all_points = np.concatenate([points, points[unique].mean(axis=1), points[triangles].mean(axis=1)])
     return QuadMesh(all_points, np.ascontiguousarray(np.concatenate(quads)))
 

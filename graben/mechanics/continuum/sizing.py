@@ -28,11 +28,7 @@ class SizeField:
     growth: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        if (
-            not self.size > 0
-            or np.any(np.asarray(self.near_size) <= 0)
-            or np.any(np.asarray(self.growth) < 0)
-        ):
+        if not self.size > 0 or np.any(np.asarray(self.near_size) <= 0) or np.any(np.asarray(self.growth) < 0):
             raise ValueError("element sizes must be positive and growth not negative")
         if len(self.segments) != len(self.near_size) or len(self.segments) != len(self.growth):
             raise ValueError("segments, near_size and growth must have one entry per refinement")

@@ -16,8 +16,9 @@ def free_surface(mesh: QuadMesh, supported: list[np.ndarray]) -> tuple[np.ndarra
 
     Returns
     -------
-    nodes (s,) in order, with the material on the right (clockwise: from left to right on a top), and the distance (s,)
-    along them, m; empty when all of the outline is supported. A closed free outline is cut at its lowest node number.
+    nodes (s,) in order, with the material on the right (clockwise: from left to right on a top), and the
+    distance (s,) along them, m; empty when all of the outline is supported. A closed free outline is cut at its
+    lowest node number.
     """
     edges = mesh.boundary_edges()
     held = np.zeros(len(edges), dtype=bool)

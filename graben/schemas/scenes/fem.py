@@ -51,9 +51,7 @@ _SLOPE_SUPPORTS: Any = [
     {"name": "right", "start": ["80 m", "0 m"], "end": ["80 m", "50 m"], "fix": "x"},
     {"name": "base", "start": ["0 m", "0 m"], "end": ["80 m", "0 m"], "fix": "y"},
 ]
-_SLOPE_LOADS: Any = [
-    {"name": "backslope", "start": ["55 m", "50 m"], "end": ["60 m", "50 m"], "rate": "0.25 MPa/s"}
-]
+_SLOPE_LOADS: Any = [{"name": "backslope", "start": ["55 m", "50 m"], "end": ["60 m", "50 m"], "rate": "0.25 MPa/s"}]
 # Y, table 4.2 (damage strains read as percent): a stand-in until a calibrated law is chained by --material FILE.
 _ROCK_MASS: Any = {
     "law": "drucker-prager",
@@ -182,7 +180,9 @@ class FemScene(Scene):
     mesh: Mesh = key(Mesh(), "the mesh")
     material: MaterialTable = key(_ROCK_MASS, "constitutive law and its parameters, or a file that holds them")
     gravity: Gravity = key(Gravity(), "weight")
-    supports: list[Support] = key(_SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)", min_length=1)
+    supports: list[Support] = key(
+        _SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)", min_length=1
+    )
     loads: list[Load] = key(_SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)", min_length=1)
     stepping: Stepping = key(Stepping(), "load steps")
 

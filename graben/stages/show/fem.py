@@ -28,7 +28,9 @@ def draw(dataset: Any, figure: Any) -> None:
     _surface(dataset, axes[1, 2])
 
 
-def _field(figure: Any, axes: Any, corners: Any, values: Any, label: str, colours: str, centred: bool = False) -> None:
+def _field(
+    figure: Any, axes: Any, corners: Any, values: Any, label: str, colours: str, centred: bool = False
+) -> None:
     from matplotlib.collections import PolyCollection
 
     fine = len(values) > 5000
@@ -59,7 +61,14 @@ def _history(dataset: Any, axes: Any) -> None:
     if int(dataset.attrs.get("failed", 0)):
         load = float(dataset.attrs["failure_load_pa"]) / 1e6
         axes.axhline(load, color="#aa3322", linewidth=1)
-        axes.annotate(f"failure at {load:.2f} MPa", (0.03, load), xycoords=("axes fraction", "data"), va="bottom", fontsize=9, color="#aa3322")
+        axes.annotate(
+            f"failure at {load:.2f} MPa",
+            (0.03, load),
+            xycoords=("axes fraction", "data"),
+            va="bottom",
+            fontsize=9,
+            color="#aa3322",
+        )
         axes.set_ylim(top=1.12 * max(load, pressure.max()))
     axes.set_xlabel("settlement of the loaded segment (mm)")
     axes.set_ylabel("pressure (MPa)")

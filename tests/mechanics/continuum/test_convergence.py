@@ -32,7 +32,9 @@ def radial_error(n, poisson, body, material):
     mesh, ids = ring(n)
     young, pressure = 1.0e9, 1.0e6
     b = body(mesh, material("elastic", young_modulus=young, poisson_ratio=poisson), lambda x, y: (x == 0, y == 0))
-    step = equilibrate(b, b.untouched(), inner_pressure(mesh, ids, pressure), np.zeros(len(b.fixed)), NewtonOptions(1e-10))
+    step = equilibrate(
+        b, b.untouched(), inner_pressure(mesh, ids, pressure), np.zeros(len(b.fixed)), NewtonOptions(1e-10)
+    )
     assert step.converged
     a, c = pressure / 3.0, 4.0 * pressure / 3.0  # sigma_r = a - c / r^2, sigma_theta = a + c / r^2
     r = np.hypot(*mesh.points.T)
@@ -44,7 +46,9 @@ def radial_error(n, poisson, body, material):
     normal = place / rg[..., None]
     s = step.state.stress
     radial = (
-        s[..., 0] * normal[..., 0] ** 2 + s[..., 1] * normal[..., 1] ** 2 + 2 * s[..., 3] * normal[..., 0] * normal[..., 1]
+        s[..., 0] * normal[..., 0] ** 2
+        + s[..., 1] * normal[..., 1] ** 2
+        + 2 * s[..., 3] * normal[..., 0] * normal[..., 1]
     )
     weight = b.elements.weight
     stress_error = np.sqrt((weight * (radial - (a - c / rg**2)) ** 2).sum() / (weight * (a - c / rg**2) ** 2).sum())

@@ -61,11 +61,13 @@ def test_halving_the_size_gives_about_four_times_the_elements():
 @given(st.lists(st.floats(-0.25, 0.25), min_size=8, max_size=8), st.floats(0.1, 0.4))
 def test_any_convex_patch_is_filled(moves, size):
     corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float) + np.reshape(moves, (4, 2))
-    mesh = mapped_mesh(corners, np.array([(0, 1, 2, 3)]), SizeField(size, np.array([[corners[0]] * 2]), np.array([size / 3]), np.array([0.2])))
-    x, y = corners.T
-    np.testing.assert_allclose(
-        mesh.areas().sum(), 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y), rtol=1e-10
+    mesh = mapped_mesh(
+        corners,
+        np.array([(0, 1, 2, 3)]),
+        SizeField(size, np.array([[corners[0]] * 2]), np.array([size / 3]), np.array([0.2])),
     )
+    x, y = corners.T
+    np.testing.assert_allclose(mesh.areas().sum(), 0.5 * np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y), rtol=1e-10)
 
 
 def test_the_sense_of_patches_and_outline_does_not_matter():

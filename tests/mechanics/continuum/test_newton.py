@@ -118,7 +118,14 @@ def test_the_march_is_bitwise_repeatable_and_independent_of_saving(block):
     b, unit = block
     ends = [
         march(
-            b, b.untouched(), lambda t: 3e6 * t * unit, 0.0, 1.0, StepOptions(0.25, 0.25, 0.01), NewtonOptions(), save_times=s
+            b,
+            b.untouched(),
+            lambda t: 3e6 * t * unit,
+            0.0,
+            1.0,
+            StepOptions(0.25, 0.25, 0.01),
+            NewtonOptions(),
+            save_times=s,
         ).state
         for s in (None, None, np.array([0.25, 0.5]))
     ]
@@ -131,11 +138,18 @@ def test_a_load_beyond_strength_ends_the_march_with_the_last_equilibrium(grid, b
     """A column of von Mises rock in plane strain carries sigma_y * 2 / sqrt(3)."""
     mesh = grid(1.0, 2.0, 2, 4)
     law = material(
-        "drucker-prager", young_modulus=1e9, poisson_ratio=0.3, friction_angle=0.0, hardening="linear", initial_yield=1e6
+        "drucker-prager",
+        young_modulus=1e9,
+        poisson_ratio=0.3,
+        friction_angle=0.0,
+        hardening="linear",
+        initial_yield=1e6,
     )
     b = body(mesh, law, ROLLERS)
     unit, _ = edge_traction(mesh, np.array([0.0, 2.0]), np.array([1.0, 2.0]))
-    run = march(b, b.untouched(), lambda t: 1e6 * t * unit, 0.0, 2.0, StepOptions(0.2, 0.2, 1e-4), NewtonOptions(1e-8))
+    run = march(
+        b, b.untouched(), lambda t: 1e6 * t * unit, 0.0, 2.0, StepOptions(0.2, 0.2, 1e-4), NewtonOptions(1e-8)
+    )
     assert not run.complete and run.reason and run.rejected > 0
     strength = 2 / np.sqrt(3)
     assert strength * 0.999 < run.time <= strength * (1 + 1e-6)
@@ -144,7 +158,15 @@ def test_a_load_beyond_strength_ends_the_march_with_the_last_equilibrium(grid, b
 
 def test_viscous_stabilisation_is_off_by_default_and_its_work_is_booked(block):
     b, unit = block
-    arguments = (b, b.untouched(), lambda t: 3e6 * t * unit, 0.0, 1.0, StepOptions(0.1, 0.1, 0.01), NewtonOptions(1e-11))
+    arguments = (
+        b,
+        b.untouched(),
+        lambda t: 3e6 * t * unit,
+        0.0,
+        1.0,
+        StepOptions(0.1, 0.1, 0.01),
+        NewtonOptions(1e-11),
+    )
     plain, slow = march(*arguments), march(*arguments, relaxation=0.05)
     assert plain.drag_work == 0.0 and slow.drag_work > 0.0
     assert slow.energy_error() < 1e-9
