@@ -254,3 +254,30 @@ def test_no_block_in_the_region(every):
 def test_zone_areas_fill_the_model(every):
     model = every["fine"]
     assert zone_areas(model.position, model.zone_vertex).sum() == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize("kind", ["voronoi", "fine", "bricks", "chamfered"])
+def test_any_region_on_disturbed_blocks(synthetic, every, kind):
+    """Forty circles and polygons of all sizes: one closed curve, exact strain, parts that add up."""
+    model = every[kind]
+    place = model.position + synthetic.separate(model, 9, 2e-3, 2e-3)
+    network = model.network(place)
+    rng = np.random.Generator(np.random.PCG64(3))
+    areas = zone_areas(place, model.zone_vertex)
+    for k in range(40):
+        r = rng.uniform(0.05, 4.0)
+        x, y = rng.uniform(r, 10.0 - r, 2)
+        angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, 5))
+        star = Polygon(tuple((x + r * np.cos(t), y + r * np.sin(t)) for t in angles))
+        outline = find_outline(network, Circle((x, y), r) if k % 2 else star)
+        met = np.concatenate([outline.steps.boundary_blocks, outline.steps.inside_blocks])
+        assert np.array_equal(np.flatnonzero(outline.blocks), np.sort(met))
+        nodes = outline.follow(place)
+        area = outline_area(nodes)
+        solid = areas[outline.blocks[model.zone_block]].sum()
+        assert solid == pytest.approx(area, rel=0.02)
+        assert np.abs(outline_gradient(nodes, outline.follow(place @ AFFINE.T)) - AFFINE).max() < 1e-13
+        u = rng.normal(0.0, 0.01, place.shape)
+        parts = zone_gradient(place, u, model.zone_vertex, outline.blocks[model.zone_block])
+        parts = parts + joint_gradient(network, outline, u)
+        assert np.abs(outline_gradient(nodes, outline.follow(u)) * area - parts).max() < 1e-13
