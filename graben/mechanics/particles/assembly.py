@@ -102,7 +102,7 @@ class Assembly:
         self.force, self.torque = np.zeros((n, 3)), np.zeros((n, 3) if law.rubs else (0, 3))
         self.wall_slip = np.zeros((n if law.rubs else 0, motion.WALLS, 3))
         self.first = np.zeros(n + 1, np.int64)
-        self.partner = np.zeros(0, np.int32)
+        self.partner = np.zeros(0, np.uint32)
         self.dash, self.slip = np.zeros(0), np.zeros((0, 3))
         self.start = self.x.copy()
         self.steps = 0
@@ -148,7 +148,7 @@ class Assembly:
         n = self.x.shape[0]
         first = np.empty(n + 1, np.int64)
         while True:
-            partner = np.empty(self._capacity, np.int32)
+            partner = np.empty(self._capacity, np.uint32)
             found = half_list(
                 self.x, self.radius, self.width, self.periodic, start, counts, self._skin, first, partner
             )

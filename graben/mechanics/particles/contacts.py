@@ -12,7 +12,7 @@ import numpy as np
 from graben.mechanics.compiled import kernel
 
 
-@kernel
+@kernel(error_model="numpy")
 def smooth_forces(x, v, radius, kind, first, partner, dash, kn, cn, width, periodic, half_dt, force):
     """Add frictionless contact forces to force (n, 3); return the energy taken by the dashpots, J."""
     lost = 0.0
@@ -68,7 +68,7 @@ def smooth_forces(x, v, radius, kind, first, partner, dash, kn, cn, width, perio
     return lost
 
 
-@kernel
+@kernel(error_model="numpy")
 def close_ledger(x, v, first, partner, dash, width, periodic, half_dt):
     """Account the second half of the last dashpot work and forget it (before a list is rebuilt); returns J."""
     lost = 0.0
@@ -92,7 +92,7 @@ def close_ledger(x, v, first, partner, dash, width, periodic, half_dt):
     return lost
 
 
-@kernel
+@kernel(error_model="numpy")
 def rub(nx, ny, nz, px, py, pz, sx, sy, sz, kt, ct, limit, dt):
     """One tangential spring with Coulomb limit H (4.7)-(4.8) and dashpot.
 
@@ -141,7 +141,7 @@ def rub(nx, ny, nz, px, py, pz, sx, sy, sz, kt, ct, limit, dt):
     return sx, sy, sz, tx, ty, tz, lost
 
 
-@kernel
+@kernel(error_model="numpy")
 def rough_forces(
     x,
     v,
@@ -174,7 +174,10 @@ def rough_forces(
     hx, hy = 0.5 * wx, 0.5 * wy
     for i in range(x.shape[0]):
         xi, yi, zi = x[i, 0], x[i, 1], x[i, 2]
+        ui, vi, wi = v[i, 0], v[i, 1], v[i, 2]
+        pi, qi, si = spin[i, 0], spin[i, 1], spin[i, 2]
         ri, ci = radius[i], kind[i]
+        sumx = sumy = sumz = turnx = turny = turnz = 0.0
         for k in range(first[i], first[i + 1]):
             j = partner[k]
             gx, gy, gz = x[j, 0] - xi, x[j, 1] - yi, x[j, 2] - zi
@@ -197,7 +200,7 @@ def rough_forces(
                 gx *= inv
                 gy *= inv
                 gz *= inv
-                px, py, pz = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2]
+                px, py, pz = v[j, 0] - ui, v[j, 1] - vi, v[j, 2] - wi
                 opening = px * gx + py * gy + pz * gz
                 overlap = rr - d
                 spring = kn[ci, cj] * overlap
@@ -209,9 +212,9 @@ def rough_forces(
                 dash[k] = damp
                 # lever arms to the contact point H (4.4)
                 ai, aj = ri - 0.5 * overlap, rj - 0.5 * overlap
-                ox = ai * spin[i, 0] + aj * spin[j, 0]
-                oy = ai * spin[i, 1] + aj * spin[j, 1]
-                oz = ai * spin[i, 2] + aj * spin[j, 2]
+                ox = ai * pi + aj * spin[j, 0]
+                oy = ai * qi + aj * spin[j, 1]
+                oz = ai * si + aj * spin[j, 2]
                 px -= oy * gz - oz * gy
                 py -= oz * gx - ox * gz
                 pz -= ox * gy - oy * gx
@@ -224,26 +227,32 @@ def rough_forces(
                 slip[k, 1] = sy
                 slip[k, 2] = sz
                 fx, fy, fz = tx - total * gx, ty - total * gy, tz - total * gz
-                force[i, 0] += fx
-                force[i, 1] += fy
-                force[i, 2] += fz
+                sumx += fx
+                sumy += fy
+                sumz += fz
                 force[j, 0] -= fx
                 force[j, 1] -= fy
                 force[j, 2] -= fz
                 mx, my, mz = gy * tz - gz * ty, gz * tx - gx * tz, gx * ty - gy * tx
-                torque[i, 0] += ai * mx
-                torque[i, 1] += ai * my
-                torque[i, 2] += ai * mz
+                turnx += ai * mx
+                turny += ai * my
+                turnz += ai * mz
                 torque[j, 0] += aj * mx
                 torque[j, 1] += aj * my
                 torque[j, 2] += aj * mz
             else:
                 if dash[k] != 0.0:
-                    opening = (v[j, 0] - v[i, 0]) * gx + (v[j, 1] - v[i, 1]) * gy + (v[j, 2] - v[i, 2]) * gz
+                    opening = (v[j, 0] - ui) * gx + (v[j, 1] - vi) * gy + (v[j, 2] - wi) * gz
                     lost -= half_dt * dash[k] * opening / np.sqrt(d2)
                     dash[k] = 0.0
                 s2 = slip[k, 0] ** 2 + slip[k, 1] ** 2 + slip[k, 2] ** 2
                 if s2 > 0.0:  # the spring of a contact that opened
                     rubbed += 0.5 * s2 / kt[ci, kind[j]]
                     slip[k, 0] = slip[k, 1] = slip[k, 2] = 0.0
+        force[i, 0] += sumx
+        force[i, 1] += sumy
+        force[i, 2] += sumz
+        torque[i, 0] += turnx
+        torque[i, 1] += turny
+        torque[i, 2] += turnz
     return lost, rubbed

@@ -32,7 +32,7 @@ DASHPOTS, FRICTION, DRAG, FLOOR_WORK, PISTON_WORK, PISTON_DASHPOT, ENTRIES = 0, 
 TIME, PISTON_PUSH, SCALARS = 0, 1, 2
 
 
-@kernel
+@kernel(error_model="numpy")
 def move(
     x,
     v,
@@ -154,7 +154,7 @@ def move(
     return far
 
 
-@kernel
+@kernel(error_model="numpy")
 def advance(
     steps,
     dt,
