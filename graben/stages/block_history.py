@@ -9,6 +9,7 @@ import numpy as np
 import xarray
 
 from graben.mechanics.averaging.history import Contacts, History
+from graben.mechanics.averaging.outline import domain_outline
 from graben.mechanics.averaging.rev import Circle, Rev
 from graben.schemas.artifact import read_artifact
 from graben.schemas.faults import BadInput, Fault
@@ -28,14 +29,16 @@ class Run:
         low, high = self.history.domain.min(axis=0), self.history.domain.max(axis=0)
         return float(low[0] + high[0]) / 2.0, float(low[1] + high[1]) / 2.0
 
-    def refuse_outside(self, rev: Rev, key: str) -> list[Fault]:
-        """A fault where a region reaches beyond the model's outline (by more than a thousandth of its radius)."""
-        beyond = rev.outside_by(self.history.domain)
+    def refuse_outside(self, rev: Rev, key: str, state: int = 0) -> list[Fault]:
+        """A fault where a region reaches beyond the model at a saved state by over a thousandth of its radius."""
+        h = self.history
+        domain = domain_outline(h.network, h.current[state]) if state else h.domain
+        beyond = rev.outside_by(domain)
         if beyond <= 1e-3 * rev.radius:
             return []
         shape = "circle" if isinstance(rev, Circle) else "polygon"
         x, y = rev.centre
-        low, high = self.history.domain.min(axis=0), self.history.domain.max(axis=0)
+        low, high = domain.min(axis=0), domain.max(axis=0)
         value = f"{shape} of radius {rev.radius:g} m at ({x:g}, {y:g}) m"
         expected = (
             f"a REV inside the model, which spans {low[0]:g} to {high[0]:g} m by {low[1]:g} to {high[1]:g} m; "

@@ -134,6 +134,7 @@ def _jobs(
         states = source.history.time.size
         if not 0 <= chosen_at < states:
             faults.append(Fault(str(path), "--chosen-at", str(chosen_at), f"a saved state, 0 to {states - 1}"))
+            continue
         try:
             revs: list[Rev] = [Circle(centre or source.middle, r) for r in radii]
             if polygon:
@@ -141,7 +142,7 @@ def _jobs(
         except ValueError as error:
             return [], [Fault("homogenize", "--radius" if radii else "--polygon", "", str(error))]
         for rev in revs:
-            faults += source.refuse_outside(rev, "--radius" if radii else "--polygon")
+            faults += source.refuse_outside(rev, "--radius" if radii else "--polygon", chosen_at)
             jobs.append((source, rev))
     return jobs, faults
 

@@ -173,6 +173,23 @@ def test_every_fault_is_named_and_nothing_written(folder, tmp_path):
         homogenize.run([folder / "dem0.nc"], out, radii=[1.0])
 
 
+def test_a_run_that_stopped_at_its_first_state(tmp_path):
+    """What an interrupted run leaves: one state, no contact."""
+    _, arrays = blocks_arrays()
+    for name, variable in LAYOUT.variables.items():
+        if name in arrays and variable.dims[:1] == ("time",):
+            arrays[name] = arrays[name][:1]
+        elif name in arrays and variable.dims[:1] == ("contact",):
+            arrays[name] = arrays[name][:0]
+    arrays["contact_count"] = np.zeros(1)
+    write_artifact(tmp_path / "short.nc", LAYOUT, arrays, Record.begin())
+    homogenize.run([tmp_path / "short.nc"], tmp_path / "c.nc", radii=[1.5])
+    data = read_artifact(tmp_path / "c.nc", "curves")
+    assert data["step_count"].values.tolist() == [1] and not data["strain"].values.any()
+    with pytest.raises(BadInput, match="three saved states"):
+        rev_study.run([tmp_path / "short.nc"], small_scene(), tmp_path / "r.nc")
+
+
 def test_broken_artifacts_are_refused(folder, tmp_path):
     whole = (folder / "dem0.nc").read_bytes()
     (tmp_path / "cut.nc").write_bytes(whole[: len(whole) // 2])

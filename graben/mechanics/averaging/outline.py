@@ -98,10 +98,11 @@ def find_outline(network: Network, rev: Rev, position: Floats | None = None) -> 
     return Outline(vertex, weight, loop, blocks, steps)
 
 
-def domain_outline(network: Network) -> Floats:
-    """(n, 2) m the outer curve of the whole model, counter-clockwise."""
+def domain_outline(network: Network, position: Floats | None = None) -> Floats:
+    """(n, 2) m outer curve of the whole model, counter-clockwise, at positions (vertex, 2) or those of the network."""
     _, loop = _enclose(network, np.ones(network.block_count, dtype=bool))
-    return network.ends(network.position, loop)[0]
+    start, end = network.ends(network.position if position is None else position, loop)
+    return np.stack([start, end], axis=1).reshape(-1, 2)
 
 
 def _moved_interior(network: Network, position: Floats) -> Floats:
