@@ -54,9 +54,8 @@ _E, _NU, _BETA, _PSI, _K, _KIND, _SIGMA0, _GAIN, _RATE, _PEAK, _EPEAK, _SLOPE, _
 )
 _TAN_BETA, _TAN_PSI, _HARD_A, _HARD_B, _LOG_D2, _D3, _TABLE = range(17, 24)
 
-_ROOT23 = math.sqrt(2.0 / 3.0)
+_ROOT2, _ROOT3, _ROOT6, _ROOT13 = math.sqrt(2.0), math.sqrt(3.0), math.sqrt(6.0), math.sqrt(1.0 / 3.0)
 _ROOT32 = math.sqrt(1.5)
-_THIRD_TURN = 2.0 * math.pi / 3.0
 _SIXTH_TURN = math.pi / 3.0
 _TAN_LIMIT = math.degrees(math.atan(3.0))  # beta where 1 - tan(beta)/3 vanishes
 
@@ -97,36 +96,44 @@ def _shape(theta, k):
 
 
 @kernel(error_model="numpy")
-def _newton(p, rho, theta, strain, bulk, flow, k, par):
-    """Smooth part of the surface by Newton: (found, dlambda, theta). flow = sqrt(6) mu."""
+def _newton(p, rho, c3, s3, strain, d, slope, bulk, flow, k, par):
+    """Smooth part of the surface by Newton: (found, dlambda, cos, sin of the turn th - th_tr).
+
+    c3, s3: cos and sin of 3 th_tr; d, slope: yield term at `strain`; flow = sqrt(6) mu. The turn is carried
+    as the tangent of its half, which needs no trigonometry.
+    """
     tan_b, tan_p = par[_TAN_BETA], par[_TAN_PSI]
     rate = 1.0 - tan_p / 3.0
-    d, slope = _yield_stress(strain, par)
     size = _ROOT32 * rho + abs(p) * tan_b + d
-    delta, multiplier = 0.0, 0.0
+    half, multiplier = 0.0, 0.0
     for _iteration in range(14):
-        h, h1, h2 = _shape(theta + delta, k)
-        sine, cosine = math.sin(delta), math.cos(delta)
+        scale = 1.0 / (1.0 + half * half)
+        c, s = (1.0 - half * half) * scale, 2.0 * half * scale
+        triple_c, triple_s = c * (4.0 * c * c - 3.0), s * (3.0 - 4.0 * s * s)
+        cos3, sin3 = c3 * triple_c - s3 * triple_s, s3 * triple_c + c3 * triple_s
+        h, h1, h2 = 1.0 + 0.5 * k * (1.0 + cos3), -1.5 * k * sin3, -4.5 * k * cos3
         a = flow * multiplier
-        radius = rho * cosine - a * h
-        turn = rho * sine + a * h1
+        radius = rho * c - a * h
+        turn = rho * s + a * h1
         excess = _ROOT32 * radius * h - tan_b * (p + bulk * tan_p * multiplier) - d
-        if multiplier > 0.0 and abs(turn) <= 1e-13 * rho and abs(excess) <= 1e-13 * size:
-            good = radius >= 0.0 and theta + delta <= _SIXTH_TURN + 1e-9 and delta >= -1e-9
-            return good, multiplier, theta + delta
-        tt = rho * cosine + a * h2
+        close = multiplier > 0.0 and abs(turn) <= 1e-8 * rho and abs(excess) <= 1e-8 * size
+        tt = rho * c + a * h2
         tm = flow * h1
         et = _ROOT32 * (radius * h1 - turn * h)
         em = -_ROOT32 * flow * h * h - tan_b * tan_p * bulk - slope * rate
         det = tt * em - tm * et
         if det == 0.0:
             break
-        delta -= (turn * em - tm * excess) / det
+        half -= (turn * em - tm * excess) / (2.0 * det * scale)
         multiplier -= (tt * excess - et * turn) / det
-        if not (0.0 <= multiplier < 1e30 and abs(delta) < 1.1):
+        if not (0.0 <= multiplier < 1e30 and abs(half) < 0.6):
             break
+        if close:  # the step just taken squares the error: nothing is left to check
+            scale = 1.0 / (1.0 + half * half)
+            fits = radius >= 0.0 and sin3 >= -1e-9 and half >= -1e-9
+            return fits, multiplier, (1.0 - half * half) * scale, 2.0 * half * scale
         d, slope = _yield_stress(strain + rate * multiplier, par)
-    return False, 0.0, theta
+    return False, 0.0, 1.0, 0.0
 
 
 @kernel(error_model="numpy")
@@ -230,30 +237,46 @@ def _damage(state, gain, eta, length, par):
 
 
 @kernel(error_model="numpy")
-def _return(s1, s2, s3, bulk, shear, state, par, length, tangent):
+def _column(tangent, j, keep, stress, ds, dp, dd):
+    """Column j of the principal block: keep (ds - dp) - dd stress."""
+    tangent[0, j] = keep * (ds[0] - dp) - dd * stress[0]
+    tangent[1, j] = keep * (ds[1] - dp) - dd * stress[1]
+    tangent[2, j] = keep * (ds[2] - dp) - dd * stress[2]
+
+
+@kernel(error_model="numpy")
+def _return(s1, s2, s3, d, slope, bulk, shear, state, par, length, tangent):
     """Effective trial principal values (sorted) -> code, s1, s2, s3 nominal, with tangent[:3, :3] and state
     set.
 
-    Called only where the trial stress lies outside the yield surface.
+    d, slope: yield term at the strain so far. Called only where the trial stress lies outside the yield
+    surface.
     """
     tan_b, tan_p = par[_TAN_BETA], par[_TAN_PSI]
     rate = 1.0 - tan_p / 3.0
     k = 1.0 / par[_K] - 1.0
-    flow = math.sqrt(6.0) * shear
+    flow = _ROOT6 * shear
     p_trial = -(s1 + s2 + s3) / 3.0
-    x = _ROOT32 * (s1 + p_trial)
-    y = (s2 - s3) * math.sqrt(0.5)
-    rho_trial = math.hypot(x, y)
-    theta_trial = math.atan2(y, x)
-    if theta_trial > _SIXTH_TURN:
-        theta_trial = _SIXTH_TURN
+    d1, d2, d3 = s1 + p_trial, s2 + p_trial, s3 + p_trial
+    rho_trial = math.sqrt(d1 * d1 + d2 * d2 + d3 * d3)
+    # unit vectors of the deviatoric plane at the trial stress: radial, and around towards compression
+    over = 1.0 / rho_trial if rho_trial > 0.0 else 0.0
+    u1, u2, u3 = d1 * over, d2 * over, d3 * over
+    g12, g23, g13 = u1 - u2, u2 - u3, u1 - u3
+    v1, v2, v3 = -g23 * _ROOT13, g13 * _ROOT13, -g12 * _ROOT13
+    cos3, sin3 = 3.0 * _ROOT6 * u1 * u2 * u3, _ROOT2 * g12 * g23 * g13
     strain = state[0]
-    found, multiplier, theta = _newton(p_trial, rho_trial, theta_trial, strain, bulk, flow, k, par)
+    found, multiplier, c, s = _newton(p_trial, rho_trial, cos3, sin3, strain, d, slope, bulk, flow, k, par)
     apex = False
     if not found:
+        theta_trial = min(math.atan2(_ROOT3 * g23, 3.0 * u1), _SIXTH_TURN)
         which, multiplier, theta = _bisect(p_trial, rho_trial, theta_trial, strain, bulk, flow, k, par)
         apex = which == 1
-    h, h1, h2 = _shape(theta, k)
+        c, s = math.cos(theta - theta_trial), math.sin(theta - theta_trial)
+    # the shape function at the end, by the same angle sums as in _newton
+    triple_c, triple_s = c * (4.0 * c * c - 3.0), s * (3.0 - 4.0 * s * s)
+    cos3, sin3 = cos3 * triple_c - sin3 * triple_s, sin3 * triple_c + cos3 * triple_s
+    h, h1, h2 = 1.0 + 0.5 * k * (1.0 + cos3), -1.5 * k * sin3, -4.5 * k * cos3
     p = p_trial + bulk * tan_p * multiplier
     a = flow * multiplier
     rho = 0.0
@@ -262,59 +285,54 @@ def _return(s1, s2, s3, bulk, shear, state, par, length, tangent):
         extra = _apex_flow(p, strain + rate * multiplier, bulk, par)
         p += bulk * extra
     else:
-        rho = rho_trial * math.cos(theta - theta_trial) - a * h
+        rho = rho_trial * c - a * h
     gain = rate * multiplier
     if extra > 0.0:
         gain += rate * extra / tan_b
-    r1, r2, r3 = math.cos(theta), math.cos(theta - _THIRD_TURN), math.cos(theta + _THIRD_TURN)
-    radius = _ROOT23 * rho
-    e1, e2, e3 = radius * r1 - p, radius * r2 - p, radius * r3 - p
+    r1, r2, r3 = c * u1 + s * v1, c * u2 + s * v2, c * u3 + s * v3
+    e1, e2, e3 = rho * r1 - p, rho * r2 - p, rho * r3 - p
     if not (abs(e1) + abs(e2) + abs(e3) + gain < 1e150):
         return NOT_CONVERGED, s1, s2, s3
     state[0] = strain + gain
     per_gain, per_eta = 0.0, 0.0
     q = _ROOT32 * rho
-    eta = -p / q if q > 1e-12 * abs(p) else (10.0 if p < 0.0 else -10.0)
     if par[_DAMAGE] != 0.0:
+        eta = -p / q if q > 1e-12 * abs(p) else (10.0 if p < 0.0 else -10.0)
         per_gain, per_eta = _damage(state, gain, eta, length, par)
     keep = 1.0 - state[1]
-    if tangent.shape[0] > 0:
-        _d, slope = _yield_stress(state[0], par)
-        r1, r2, r3 = _ROOT23 * r1, _ROOT23 * r2, _ROOT23 * r3
-        t1 = -_ROOT23 * math.sin(theta)
-        t2 = -_ROOT23 * math.sin(theta - _THIRD_TURN)
-        t3 = -_ROOT23 * math.sin(theta + _THIRD_TURN)
-        radial = (r1, r2, r3)
-        around = (t1, t2, t3)
-        stress = (e1, e2, e3)
-        if apex:
-            soft = tan_b * bulk + (slope * rate / tan_b if tan_b > 0.0 else 0.0)
-            for j in range(3):
-                lam = 2.0 * shear * radial[j] / (flow * h)
-                v = 0.0
-                if extra > 0.0 and soft != 0.0:
-                    v = (tan_b * bulk - (tan_b * bulk * tan_p + slope * rate) * lam) / soft
-                dp = -bulk + bulk * tan_p * lam + bulk * v
-                dgain = rate * lam + (rate * v / tan_b if tan_b > 0.0 else 0.0)
-                for i in range(3):
-                    tangent[i, j] = -keep * dp - per_gain * dgain * stress[i]
-        else:
-            m = 1.0 / (1.0 + a * (h + h2) / rho) if rho > 0.0 else 0.0
-            turn = m * h1
-            stiff = _ROOT32 * flow * (h * h + h1 * turn) + tan_b * tan_p * bulk + slope * rate
-            for j in range(3):
-                lam = 0.0
-                if stiff != 0.0:
-                    lam = (_ROOT32 * 2.0 * shear * (h * radial[j] + turn * around[j]) + tan_b * bulk) / stiff
-                dp = -bulk + bulk * tan_p * lam
-                dd = per_gain * rate * lam
-                if per_eta != 0.0:
-                    drho = 2.0 * shear * radial[j] - flow * h * lam
-                    dd += per_eta * (-dp + p / rho * drho) / q
-                for i in range(3):
-                    ds = 2.0 * shear * (radial[i] * radial[j] + m * around[i] * around[j])
-                    ds -= flow * lam * (h * radial[i] + turn * around[i])
-                    tangent[i, j] = keep * (ds - dp) - dd * stress[i]
+    if tangent.shape[0] == 0:
+        return OK, keep * e1, keep * e2, keep * e3
+    _d, slope = _yield_stress(state[0], par)
+    stress, radial = (e1, e2, e3), (r1, r2, r3)
+    twice = 2.0 * shear
+    if apex:
+        soft = tan_b * bulk + (slope * rate / tan_b if tan_b > 0.0 else 0.0)
+        for j in range(3):
+            lam = twice * radial[j] / (flow * h)
+            v = 0.0
+            if extra > 0.0 and soft != 0.0:
+                v = (tan_b * bulk - (tan_b * bulk * tan_p + slope * rate) * lam) / soft
+            dp = -bulk + bulk * tan_p * lam + bulk * v
+            dgain = rate * lam + (rate * v / tan_b if tan_b > 0.0 else 0.0)
+            _column(tangent, j, keep, stress, (0.0, 0.0, 0.0), dp, per_gain * dgain)
+        return OK, keep * e1, keep * e2, keep * e3
+    m = 1.0 / (1.0 + a * (h + h2) / rho) if rho > 0.0 else 0.0
+    turn = m * h1
+    stiff = _ROOT32 * flow * (h * h + h1 * turn) + tan_b * tan_p * bulk + slope * rate
+    weak = 1.0 / stiff if stiff != 0.0 else 0.0
+    t1, t2, t3 = c * v1 - s * u1, c * v2 - s * u2, c * v3 - s * u3
+    around = (t1, t2, t3)
+    n1, n2, n3 = h * r1 + turn * t1, h * r2 + turn * t2, h * r3 + turn * t3
+    normal = (n1, n2, n3)
+    for j in range(3):
+        lam = (_ROOT32 * twice * normal[j] + tan_b * bulk) * weak
+        dp = -bulk + bulk * tan_p * lam
+        dd = per_gain * rate * lam
+        if per_eta != 0.0:
+            dd += per_eta * (-dp + p / rho * (twice * radial[j] - flow * h * lam)) / q
+        x, y, z = twice * radial[j], twice * m * around[j], flow * lam
+        ds = (r1 * x + t1 * y - n1 * z, r2 * x + t2 * y - n2 * z, r3 * x + t3 * y - n3 * z)
+        _column(tangent, j, keep, stress, ds, dp, dd)
     return OK, keep * e1, keep * e2, keep * e3
 
 
@@ -342,14 +360,14 @@ def update_drucker_prager(deps, sig, state, par, length, tangent):
         det = d0 * (d1 * d2 - x4 * x4) - x3 * (x3 * d2 - x4 * x5) + x5 * (x3 * x4 - d1 * x5)
         cos3 = 13.5 * det / (q2 * q)
     t = q * (1.0 + 0.5 * k * (1.0 + cos3))
-    d, _slope = _yield_stress(state[0], par)
+    d, slope = _yield_stress(state[0], par)
     friction = p * par[_TAN_BETA]
     if t - friction - d <= 1e-13 * (t + abs(friction) + d):
         fill_elastic(keep, bulk, shear, tangent)
         return OK
     if n == 4:
         s1, s2, s3, c, s, rank = split_plane(x0, x1, x2, x3)
-        code, e1, e2, e3 = _return(s1, s2, s3, bulk, shear, state, par, length, tangent)
+        code, e1, e2, e3 = _return(s1, s2, s3, d, slope, bulk, shear, state, par, length, tangent)
         if code != OK:
             sig[0], sig[1], sig[2], sig[3] = old0, old1, old2, old3
             return code
@@ -362,7 +380,7 @@ def update_drucker_prager(deps, sig, state, par, length, tangent):
     whole = np.empty(6)
     whole[0], whole[1], whole[2], whole[3], whole[4], whole[5] = x0, x1, x2, x3, x4, x5
     s1, s2, s3 = split_space(whole, vectors)
-    code, e1, e2, e3 = _return(s1, s2, s3, bulk, shear, state, par, length, tangent)
+    code, e1, e2, e3 = _return(s1, s2, s3, d, slope, bulk, shear, state, par, length, tangent)
     if code != OK:
         sig[0], sig[1], sig[2], sig[3], sig[4], sig[5] = old0, old1, old2, old3, old4, old5
         return code

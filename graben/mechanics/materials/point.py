@@ -135,7 +135,7 @@ def drive(
     """
     rows, n = targets.shape
     free = np.empty(n, np.int64)
-    m = 0
+    m = 0 * n  # not the literal 0, which would compile `increment` twice
     for i in range(n):
         if control[i] == 1:
             free[m] = i

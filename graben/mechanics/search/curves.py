@@ -9,10 +9,10 @@ objective stays finite and continuous.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -102,7 +102,7 @@ def _one(
         )  # fmt: skip
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", nogil=True)
 def _batch(
     law_id, base, slots, values, start_state, length, tolerance, parts, seat_parts, seats, controls, targets,
     rows,
@@ -110,21 +110,6 @@ def _batch(
 ):  # fmt: skip
     """Responses of all candidates, one after the other."""
     for k in range(values.shape[0]):
-        _one(
-            law_id, base, slots, values[k], start_state, length, tolerance, parts, seat_parts, seats,
-            controls,
-            targets, rows, zero, stress[k], strain[k], reached[k],
-        )  # fmt: skip
-
-
-@kernel(error_model="numpy", parallel=True, nogil=True)
-def _batch_threads(
-    law_id, base, slots, values, start_state, length, tolerance, parts, seat_parts, seats, controls, targets,
-    rows,
-    zero, stress, strain, reached,
-):  # fmt: skip
-    """The same with the candidates shared among threads; each candidate's numbers are the same."""
-    for k in numba.prange(values.shape[0]):
         _one(
             law_id, base, slots, values[k], start_state, length, tolerance, parts, seat_parts, seats,
             controls,
@@ -219,8 +204,8 @@ class CurveFit:
                 (1, c.fit_strain, c.strain, top_strain),
             ):
                 for k in columns:
-                    own = float(np.abs(data[:, k]).max()) or top
-                    size = own if self.weights.normalise == "curve" else top
+                    own = float(np.nanmax(np.abs(data[:, k]), initial=0.0)) or top
+                    size = (own if self.weights.normalise == "curve" else top) or 1.0
                     part = 1.0 if kind == 0 else self.weights.strain
                     if part == 0.0:
                         continue
@@ -246,21 +231,21 @@ class CurveFit:
         shape = (len(values), *self._targets.shape)
         stress, strain = np.zeros(shape), np.zeros(shape)
         reached = np.empty(shape[:2])
-        arguments = (
-            self._id, self._base, self._slots, values, self._start, float(self.length), float(self.tolerance),
-            int(self.parts), int(self.seat_parts), self._seats, self._controls, self._targets, self._rows,
-            self._zero,
-            stress, strain, reached,
-        )  # fmt: skip
-        if self.workers > 1 and len(values) > 1:
-            before = numba.get_num_threads()
-            numba.set_num_threads(min(self.workers, numba.config.NUMBA_NUM_THREADS))
-            try:
-                _batch_threads(*arguments)
-            finally:
-                numba.set_num_threads(before)
+
+        def run(first: int, last: int) -> None:
+            _batch(
+                self._id, self._base, self._slots, values[first:last], self._start, float(self.length),
+                float(self.tolerance), int(self.parts), int(self.seat_parts), self._seats, self._controls,
+                self._targets, self._rows, self._zero, stress[first:last], strain[first:last], reached[first:last],
+            )  # fmt: skip
+
+        workers = min(self.workers, len(values))
+        if workers > 1:  # the kernel releases the interpreter; a second compilation for threads is saved
+            edges = np.linspace(0, len(values), workers + 1).astype(int)
+            with ThreadPoolExecutor(workers) as pool:
+                list(pool.map(run, edges[:-1], edges[1:]))
         else:
-            _batch(*arguments)
+            run(0, len(values))
         strain[..., 3:] *= 0.5
         return Predictions(stress, strain, reached)
 

@@ -1,0 +1,75 @@
+"""Covariance against linear regression's closed form, coverage of intervals, and what the data cannot see."""
+
+import numpy as np
+import pytest
+
+from graben.mechanics.search.identifiability import UNSEEN, identify
+
+
+def line(m=200, noise=0.05, seed=0):
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 1, m)
+    a = np.stack([np.ones(m), t], axis=1)
+    truth = np.array([0.4, 0.5])
+    y = a @ truth + noise * rng.normal(size=m)
+    x = np.linalg.lstsq(a, y, rcond=None)[0]
+    return a, x, a @ x - y, truth
+
+
+def test_covariance_is_that_of_linear_regression():
+    a, x, r, _truth = line()
+    k = identify(x, r, a)
+    expected = (r @ r) / (len(r) - 2) * np.linalg.inv(a.T @ a)
+    np.testing.assert_allclose(k.covariance, expected, rtol=1e-10)
+    np.testing.assert_allclose(k.standard_error, np.sqrt(np.diag(expected)), rtol=1e-10)
+    assert k.correlation[0, 1] == pytest.approx(expected[0, 1] / np.sqrt(expected[0, 0] * expected[1, 1]))
+    assert k.identifiable.all() and not k.unseen.any()
+
+
+def test_intervals_cover_the_truth_as_often_as_they_say():
+    inside = []
+    for seed in range(400):
+        a, x, r, truth = line(seed=seed)
+        k = identify(x, r, a, groups=np.zeros(len(r), int), lag=3)
+        inside.append([np.abs(x - truth) < 1.96 * k.standard_error, np.abs(x - truth) < 1.96 * k.robust_error])
+    plain, robust = np.mean(inside, axis=(0, 2))
+    assert 0.92 < plain < 0.98 and 0.90 < robust < 0.98
+
+
+def test_correlated_residuals_widen_the_robust_interval_only():
+    """Noise that repeats over 10 points carries a tenth of the information: errors sqrt(10) larger."""
+    rng = np.random.default_rng(1)
+    m = 2000
+    a = np.stack([np.ones(m), np.linspace(-1, 1, m)], axis=1)
+    noise = np.repeat(rng.normal(size=m // 10), 10) * 0.1
+    x = np.linalg.lstsq(a, a @ [0.5, 0.5] + noise, rcond=None)[0]
+    r = a @ (x - 0.5) - noise
+    k = identify(x, r, a, groups=np.zeros(m, int), lag=40)
+    ratio = k.robust_error / k.standard_error
+    np.testing.assert_allclose(ratio, np.sqrt(10), rtol=0.35)
+
+
+def test_a_duplicated_parameter_is_not_identifiable():
+    a, _x, _r, _truth = line()
+    twin = np.stack([a[:, 0], a[:, 1], a[:, 1]], axis=1)
+    r = 0.01 * np.random.default_rng(2).normal(size=len(a))
+    k = identify(np.array([0.5, 0.4, 0.6]), r, twin)
+    assert k.identifiable.tolist() == [True, False, False]
+    assert k.unseen.tolist() == [True, False, False]
+    np.testing.assert_allclose(np.abs(k.directions[0]), [0, np.sqrt(0.5), np.sqrt(0.5)], atol=1e-6)
+    assert np.isnan(k.standard_error[1:]).all() and np.isfinite(k.standard_error[0])
+
+
+def test_a_parameter_without_effect_and_one_at_a_bound_are_told_apart():
+    a, _x, _r, _truth = line()
+    j = np.stack([a[:, 0], np.zeros(len(a)), a[:, 1]], axis=1)
+    r = 0.01 * np.random.default_rng(2).normal(size=len(a))
+    k = identify(np.array([0.5, 0.4, 1.0]), r, j)
+    assert k.free.tolist() == [True, True, False]
+    assert k.identifiable.tolist() == [True, False, False]
+    assert k.direction_error[0] > UNSEEN and np.isnan(k.standard_error[2])
+
+
+def test_everything_at_a_bound_gives_nothing_rather_than_an_error():
+    k = identify(np.array([0.0, 1.0]), np.ones(5), np.ones((5, 2)))
+    assert not k.free.any() and k.directions.shape == (0, 2) and not k.identifiable.any()
