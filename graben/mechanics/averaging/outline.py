@@ -99,7 +99,7 @@ def find_outline(network: Network, rev: Rev, position: Floats | None = None) -> 
 
 
 def domain_outline(network: Network, position: Floats | None = None) -> Floats:
-    """(n, 2) m outer curve of the whole model, counter-clockwise, at positions (vertex, 2) or those of the network."""
+    """(n, 2) m outer curve of the model, counter-clockwise, at positions (vertex, 2) or those of the network."""
     _, loop = _enclose(network, np.ones(network.block_count, dtype=bool))
     start, end = network.ends(network.position if position is None else position, loop)
     return np.stack([start, end], axis=1).reshape(-1, 2)

@@ -93,7 +93,8 @@ def forces_on(
 def per_state(state: Ints, values: Floats, count: int) -> Floats:
     """Sums (count, ...) over the entries of each saved state, in the order given."""
     flat = values.reshape(values.shape[0], int(np.prod(values.shape[1:])))
-    sums = [np.bincount(state, flat[:, k], minlength=count) for k in range(flat.shape[1])]
+    # bincount of nothing gives integers
+    sums = [np.bincount(state, flat[:, k], minlength=count).astype(np.float64) for k in range(flat.shape[1])]
     return np.stack(sums, axis=1).reshape(count, *values.shape[1:])
 
 
