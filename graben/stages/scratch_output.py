@@ -100,11 +100,9 @@ def _headline(
     else:
         steady = (result.phase == 0) & (np.arange(len(result.phase)) >= np.sum(result.phase == 0) - 3)
         normal, along = -result.force[steady, 2], result.force[steady, 0]
-    by_path = {}
-    for k in range(1, int(path / a) + 1):
-        x = start + k * a
-        if x <= start + path:
-            by_path[str(k)] = wear([measure_at(positions, sections[1], x)])
+    along_path = np.array([s.degree_of_wear for s in sections[1]])
+    whole = range(1, int(path / a) + 1)
+    by_path = {str(k): float(np.interp(start + k * a, positions, along_path)) for k in whole}
     return {
         "groove_area_m2": mean(rest, "groove_area"),
         "shoulder_area_m2": mean(rest, "shoulder_area"),
@@ -122,11 +120,6 @@ def _headline(
         "bow_wave_share": volumes.bow / volumes.groove if volumes.groove > 0.0 else 0.0,
         "volume_closure": volumes.closure,
     }
-
-
-def measure_at(positions: np.ndarray, sections: list[Section], x: float) -> Section:
-    """The section nearest to x."""
-    return sections[int(np.argmin(np.abs(positions - x)))]
 
 
 def write_run(
