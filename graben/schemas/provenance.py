@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 import resource
 import sys
@@ -23,6 +24,12 @@ def sha256_of(path: str | Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
+def _cpu_seconds() -> float:
+    """CPU time of this process and of its workers that have ended."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
 @dataclass
 class Record:
     """Provenance and cost of one run. Begin it when a stage starts; `attributes` closes the clocks.
@@ -35,7 +42,7 @@ class Record:
     inputs: dict[str, str] = field(default_factory=dict)
     cost: dict[str, Any] = field(default_factory=dict)
     _wall: float = field(default_factory=time.perf_counter)
-    _cpu: float = field(default_factory=time.process_time)
+    _cpu: float = field(default_factory=_cpu_seconds)
 
     @classmethod
     def begin(cls, scene: Scene | None = None, inputs: Iterable[str | Path] = ()) -> Record:
@@ -51,7 +58,7 @@ class Record:
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         return {
             "wall_s": time.perf_counter() - self._wall,
-            "cpu_s": time.process_time() - self._cpu,
+            "cpu_s": _cpu_seconds() - self._cpu,
             "peak_memory_bytes": int(peak) * (1 if sys.platform == "darwin" else 1024),
             **self.cost,
         }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -62,7 +61,6 @@ def run(
     record = Record.begin(scene, inputs=inputs)
     centres = _centres(runs, scene)
     chunks = _chunks(runs, centres, scene)
-    before = _workers_cpu()
     samples = _sampled(chunks, scene.processes or os.cpu_count() or 1, progress)
     arrays = _arrays(runs, centres, samples, scene)
     criteria = Criteria(
@@ -97,7 +95,6 @@ def run(
     record.cost |= {
         "samples": int(arrays["area"].size),
         "processes": scene.processes or os.cpu_count() or 1,
-        "workers_cpu_s": _workers_cpu() - before,
     }
     attributes = {
         "reason": advice.reason,
@@ -114,12 +111,6 @@ def run(
         "samples": int(arrays["area"].size),
         "properties": [_row(name, c) for name, c in by_name.items()],
     }
-
-
-def _workers_cpu() -> float:
-    """CPU seconds of worker processes that have ended; cpu_s of the record counts this process only."""
-    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return usage.ru_utime + usage.ru_stime
 
 
 def _row(name: str, c: Convergence) -> dict[str, Any]:

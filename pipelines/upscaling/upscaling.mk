@@ -23,6 +23,7 @@ FORCE:
 
 # $(call stage,COMMAND): run a stage for target $@ and keep its headline numbers beside it.
 define stage
+	@mkdir -p $(@D)
 	$(BIN)/$(1) -o $@ --overwrite --json > $(@:.nc=.json.part)
 	@mv $(@:.nc=.json.part) $(@:.nc=.json)
 endef
