@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from graben.stages.material import pack_material
 from graben.stages.record import Progress, Record, silent
 from graben.stages.scratch_output import measure_groove, write_last_good, write_run
 
+_log = logging.getLogger(__name__)
 # Laws whose strain increments may add up to plastic strains of order 1 under the tip.
 _TAKES = ("elastic", "j2", "erve", "drucker-prager")
 
@@ -44,7 +46,7 @@ def run(
     -------
     headline numbers: groove_area_m2, shoulder_area_m2, degree_of_wear (after lifting, at s_over_a),
     degree_of_wear_loaded, degree_of_wear_by_s_over_a, degree_of_penetration, normal_force_n, tangential_force_n,
-    energy_error, elements, steps
+    energy_error, elements, steps, warnings
 
     Raises
     ------
@@ -84,6 +86,9 @@ def run(
     progress(0.99, "sections")
     groove = measure_groove(scene, mesh, result)
     headline = {**groove.headline, **_cost(result)}
+    headline["warnings"] = _warnings(headline)
+    for text in headline["warnings"]:
+        _log.warning(text)
     record.cost.update(result.cost)
     record.cost.update({k: headline[k] for k in ("energy_error", "hourglass_share", "kinetic_share_sliding")})
     record.cost["mesh_size_m"] = mesh_size(scene)
@@ -156,6 +161,26 @@ def _damage(scene: ScratchScene, law: Law) -> mechanics.Damage | None:
     if scene.damage is None:
         return None
     return mechanics.Damage(scene.damage.growth_per_joule, scene.damage.remove_at, law.index("max_damage_step"))
+
+
+def _warnings(headline: dict[str, Any]) -> list[str]:
+    """What a user should know before trusting the groove."""
+    found = []
+    if headline["hourglass_share"] > 0.05:
+        found.append(
+            f"work against hourglass control is {100 * headline['hourglass_share']:.0f} % of the internal energy "
+            "(5 % is the most to trust): use a smaller mesh.size or numerics.points = 8"
+        )
+    if headline["kinetic_share_sliding"] > 0.05:
+        found.append(
+            f"kinetic energy is {100 * headline['kinetic_share_sliding']:.0f} % of the internal energy "
+            "while sliding: lower numerics.slide_speed"
+        )
+    if headline["removed_elements"] > 0 and headline["degree_of_wear"] > 0.99:
+        found.append(
+            "damage removed the whole track: the degree of wear follows from the damage settings, not the steel"
+        )
+    return found
 
 
 def _cost(result: mechanics.ScratchRun) -> dict[str, Any]:
