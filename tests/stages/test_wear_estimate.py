@@ -11,6 +11,7 @@ from graben.cli.wear_estimate import main
 from graben.schemas.artifact import check_artifact, read_artifact, write_artifact
 from graben.schemas.faults import BadInput
 from graben.schemas.layouts.particles import LAYOUT as PARTICLES
+from graben.schemas.layouts.scratch import LAYOUT as SCRATCH
 from graben.schemas.provenance import Record
 from graben.stages import wear_estimate
 
@@ -49,27 +50,33 @@ def test_balanced_contacts_carry_the_applied_load(tmp_path, split):
     assert first == pytest.approx(130 / force_each * 0.37 * 88.4e-12 * (force_each / 2.0) ** 1.5 * 2.39286, rel=1e-4)
 
 
+def filled(layout, **values) -> dict:
+    """Every variable of a layout, one long in each dim and filled with ones, but for the values given."""
+    sizes = {"class": len(values.get("class_name", ["x"])), "side": 2, "axis": 3}
+    arrays = {}
+    for name, v in layout.variables.items():
+        shape = tuple(sizes.get(d, 1) for d in v.dims)
+        arrays[name] = np.full(shape, "x") if v.dtype == "U" else np.ones(shape)
+    return arrays | values
+
+
 def fake_bed(path: Path, names=("D100",), diameter=(1e-4,), count=(98,), share=(1.0,), force=(1e-6,)) -> Path:
     """A small artifact as dem-run writes it; only what wear-estimate reads matters."""
-    sizes = {
-        "class": len(names),
-        "bed": 1,
-        "particle": 1,
-        "contact": 1,
-        "state": 1,
-        "sample": 1,
-        "side": 2,
-        "axis": 3,
-    }
-    arrays = {}
-    for name, v in PARTICLES.variables.items():
-        shape = tuple(sizes[d] for d in v.dims)
-        arrays[name] = np.full(shape, "x") if v.dtype == "U" else np.ones(shape)
-    arrays |= {
-        "class_name": np.array(names), "class_diameter": diameter, "class_share": share,
-        "floor_contacts_per_area": np.array(count) / 1e-6, "floor_contact_force": force,
-    }  # fmt: skip
+    arrays = filled(
+        PARTICLES,
+        class_name=np.array(names),
+        class_diameter=diameter,
+        class_share=share,
+        floor_contacts_per_area=np.array(count) / 1e-6,
+        floor_contact_force=force,
+    )
     write_artifact(path, PARTICLES, arrays, Record())
+    return path
+
+
+def fake_scratch(path: Path, radius=50e-6, force=2.0, area=88.4e-12, degree=0.37) -> Path:
+    arrays = filled(SCRATCH, grain_radius=radius, normal_force=force, groove_area=area, degree_of_wear=degree)
+    write_artifact(path, SCRATCH, arrays, Record())
     return path
 
 
@@ -113,6 +120,35 @@ def test_forces_split_as_measured_in_a_bed(tmp_path):
     force = read_artifact(tmp_path / "w.nc", "wear")["contact_force"].values[0]
     assert force[1] / force[0] == pytest.approx(3.0)
     assert 114.3 * (60 * force[0] + 10 * force[1]) == pytest.approx(130.0)
+
+
+def test_grooves_of_scratch_artifacts(tmp_path):
+    """Own bed, two grooves, load balanced: the scene of the chain; the force lies between the two grooves."""
+    bed = fake_bed(tmp_path / "bed.nc", ("grains",))
+    each = 130.0 / (98e6 * 114.3e-6)
+    light = fake_scratch(tmp_path / "a.nc", force=0.5 * each, area=1e-13, degree=0.2)
+    heavy = fake_scratch(tmp_path / "b.nc", force=2.0 * each, area=4e-13, degree=0.4)
+    arguments = [str(SCENES / "own-bed-and-groove.toml"), "-o", str(tmp_path / "w.nc"), "--json", "--bed", str(bed)]
+    result = CliRunner().invoke(main, [*arguments, "--scratch", f"grains={light}", "--scratch", f"grains={heavy}"])
+    assert result.exit_code == 0, result.output
+    headline = json.loads(result.stdout)
+    assert headline["warnings"] == []
+    expected = 98e6 * 114.3e-6 * 0.3 * 2e-13 * 2.39286  # middle of both in the logarithm
+    assert headline["mixtures"][0]["wear_rate_m3_per_s"] == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("scratch", "words"),
+    [
+        ({"radius": 100e-6}, "half the diameter"),
+        ({"area": 0.0}, "positive values"),
+        ({"force": -1.0}, "positive values"),
+    ],
+)
+def test_scratches_that_do_not_fit(one, tmp_path, scratch, words):
+    file = fake_scratch(tmp_path / "s.nc", **scratch)
+    with pytest.raises(BadInput, match=words):
+        wear_estimate.run(one, tmp_path / "w.nc", scratch={"D100": [file]})
 
 
 @pytest.mark.parametrize(
