@@ -16,7 +16,8 @@ from graben.mechanics.materials.law import Parameter
 
 def check(values: Mapping[str, Any]) -> list[str]:
     found = []
-    if values.get("hardening", "exponential") == "barcelona" and values["peak_yield"] < values.get("initial_yield", 0.0):
+    barcelona = values.get("hardening", "exponential") == "barcelona"
+    if barcelona and values["peak_yield"] < values.get("initial_yield", 0.0):
         found.append("peak_yield at least initial_yield")
     if values.get("hardening") == "table" and np.any(np.asarray(values["hardening_table"])[:, 1] < 0.0):
         found.append("hardening_table without negative stresses")
