@@ -16,7 +16,7 @@ upscaling: $(UP)/summary.json $(UP_PICTURES) ## the up-scaling chain: blocks, av
 
 # Rewritten only when the fidelity changes, so that a change of it reruns the chain.
 $(UP)/.fidelity: FORCE
-	@mkdir -p $(@D); [ "$$(cat $@ 2>/dev/null)" = "$(FIDELITY)" ] || echo "$(FIDELITY)" > $@
+	+@mkdir -p $(@D); [ "$$(cat $@ 2>/dev/null)" = "$(FIDELITY)" ] || echo "$(FIDELITY)" > $@
 
 .PHONY: FORCE
 FORCE:

@@ -9,7 +9,7 @@ WEAR_ARTIFACTS := $(WEAR)/bed.nc $(WEAR)/scratch.nc $(WEAR)/astm-g65-mixtures.nc
 wear: $(WEAR)/summary.json $(WEAR_PICTURES) ## the wear chain: bed, scratch, wear rate
 
 $(WEAR)/.fidelity: FORCE
-	@mkdir -p $(@D); [ "$$(cat $@ 2>/dev/null)" = "$(FIDELITY)" ] || echo "$(FIDELITY)" > $@
+	+@mkdir -p $(@D); [ "$$(cat $@ 2>/dev/null)" = "$(FIDELITY)" ] || echo "$(FIDELITY)" > $@
 
 $(WEAR)/bed.nc: $(WEAR_SCENES)/bed.toml $(WEAR)/.fidelity | $(READY)
 	$(call stage,dem-run $< --set fidelity=$(FIDELITY))
