@@ -111,7 +111,7 @@ class ParticlesScene(Scene):
                 f"(found {self.box.width:.4g} m)"
             )
         if self.box.depth < largest:
-            faults.append(f"box.depth of at least the largest diameter, {largest:.4g} m (found {self.box.depth:.4g} m)")
+            faults.append(f"box.depth of at least one diameter, {largest:.4g} m (found {self.box.depth:.4g} m)")
         for g in self.grains:
             solid = 0.6 * self.box.width**2 * self.box.depth * g.share
             if g.share > 0 and round(solid / (0.5235987755982988 * g.diameter**3)) == 0:
