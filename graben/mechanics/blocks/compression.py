@@ -11,7 +11,6 @@ from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.failure import NumericsFailed
 
-
 # Rest comes soonest with more damping than a moving wall should feel.
 _CONSOLIDATION_DAMPING = 1.0
 

@@ -19,6 +19,10 @@ from graben.mechanics.compiled import kernel
 # Edges count as facing each other up to 60 degrees, fully up to 45: forces fade in between.
 FACING_NONE, FACING_FULL = 0.5, 0.7
 
+# A chamfer bears on no more than this share of its length less than the interval that it shares with another edge:
+# chamfers begin where their neighbour's contact ends, and would all touch by their rims, for next to no force.
+RIM_SHARE = 0.1
+
 STICK, SLIP, OPEN, BROKEN = 0, 1, 2, 3
 
 
@@ -56,14 +60,14 @@ class Pairs(NamedTuple):
     intact: np.ndarray
 
 
-# Columns of the node table: position, velocity, and of the edge that starts there unit tangent, length and whether it
-# is a chamfer (1 or 0). One cache line a node, since the contact kernel reads nodes in no order.
-X, Y, VX, VY, TX, TY, LENGTH, CHAMFER, COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8
+# Columns of the node table: position, velocity, and of the edge that starts there unit tangent, length and rim
+# (0 but for chamfers). One cache line a node, since the contact kernel reads nodes in no order.
+X, Y, VX, VY, TX, TY, LENGTH, RIM, COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
 
 @kernel(error_model="numpy")
 def node_motion(x, v, first, second, weight, follow, node):
-    """Fill the node table (nodes, 8) from vertex positions x and velocities v (vertices, 2); CHAMFER stays."""
+    """Fill the node table (nodes, 8) from vertex positions x and velocities v (vertices, 2); RIM stays."""
     for i in range(first.shape[0]):
         a = first[i]
         b = second[i]
@@ -96,15 +100,16 @@ def scatter_nodes(fn, first, second, weight, force):
 
 
 @kernel(error_model="numpy")
-def _pressed_share(gap0, gap1, chamfer):
-    """Share of the interval that a chamfer bears on: up to where the gap opens. 1 for plain edges.
+def _bearing(length, gap0, gap1, rim):
+    """Length over which two edges bear that share an interval `length`: all of it, unless one is a chamfer.
 
-    A plain edge keeps the half length of each end whole, as the reference model does; a chamfer stands for a
-    rounded corner, and where only its rim is pressed it must not act with its whole length.
+    A plain edge keeps the half length of each end whole, as the reference model does. A chamfer stands for a
+    rounded corner: its rim does not bear, nor does what lies beyond the point where the gap opens.
     """
-    if chamfer == 0.0 or gap0 * gap1 >= 0.0:
-        return 1.0
-    return abs(min(gap0, gap1)) / abs(gap1 - gap0)
+    if rim == 0.0:
+        return length
+    share = 1.0 if gap0 * gap1 >= 0.0 else abs(min(gap0, gap1)) / abs(gap1 - gap0)
+    return share * max(0.0, length - rim)
 
 
 @kernel(error_model="numpy")
@@ -155,7 +160,9 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
         s1 = (node[f2, X] - ox) * tx + (node[f2, Y] - oy) * ty
         low = max(0.0, s1)
         high = min(se, s0)
-        if high <= low:
+        rim = node[e, RIM] + node[f, RIM]
+        # Lengths are still stretched by sqrt(2 + 2 facing), at least sqrt(3).
+        if high - low <= 1.7 * rim:
             if pairs.live[c] == 1:
                 forget(pairs, c)
                 pairs.live[c] = 0
@@ -195,10 +202,9 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
                 return c
             continue
         pairs.live[c] = 1
-        area = 0.5 * length
+        area = 0.5 * _bearing(length, gap0, gap1, rim)
         if facing < FACING_FULL:
             area *= (facing - FACING_NONE) / (FACING_FULL - FACING_NONE)
-        area *= _pressed_share(gap0, gap1, node[e, CHAMFER] + node[f, CHAMFER])
         fex0 = 0.0
         fey0 = 0.0
         fex1 = 0.0
@@ -301,7 +307,8 @@ def contact_state(pairs, follow, node, joint, deepest, out, ints):
         s1 = (node[f2, X] - ox) * tx + (node[f2, Y] - oy) * ty
         low = max(0.0, s1)
         high = min(se, s0)
-        if high <= low:
+        rim = node[e, RIM] + node[f, RIM]
+        if high - low <= rim:
             continue
         rise = node[e, LENGTH] * (node[e, TX] * ty - node[e, TY] * tx) / se
         h0 = (node[f, X] - ox) * ty - (node[f, Y] - oy) * tx
@@ -311,7 +318,7 @@ def contact_state(pairs, follow, node, joint, deepest, out, ints):
             area *= (facing - FACING_NONE) / (FACING_FULL - FACING_NONE)
         gap0 = h1 + (h0 - h1) * (low - s1) / (s0 - s1) - rise * low
         gap1 = h1 + (h0 - h1) * (high - s1) / (s0 - s1) - rise * high
-        area *= _pressed_share(gap0, gap1, node[e, CHAMFER] + node[f, CHAMFER])
+        area *= _bearing(high - low, gap0, gap1, rim) / (high - low)
         normal = 0.0
         shear = 0.0
         gaps = 0.0

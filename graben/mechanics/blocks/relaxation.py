@@ -14,7 +14,7 @@ from graben.mechanics.compiled import kernel
 DONE, REBUILD, RUNAWAY, DEEP_OVERLAP = 0, 1, 2, 3
 
 # Places in Motion.tally
-KINETIC, DAMPED, ZONE_WORK, JOINT_WORK, LOAD_WORK, WALL_WORK, RATE_SEEN, DAMPED_SEEN = range(8)
+KINETIC, DAMPED, LOAD_WORK, WALL_WORK, RATE_SEEN, DAMPED_SEEN = range(6)
 # Places in Motion.sums (kept by the contact kernel)
 FRICTION, LARGEST_OVERLAP = range(2)
 # Places in Motion.drive
@@ -25,7 +25,7 @@ class Skeleton(NamedTuple):
     """What does not change while stepping: zones, contact nodes, masses, constraints and loads.
 
     triangles, gradient, area, lam, mu : zones; first, second, weight, follow : contact nodes
-    mass : (vertices,) [kg/m]; held : (vertices, 2) 1 where the velocity is prescribed, then wall (vertices, 2) [m/s]
+    mass : (vertices,) [kg/m]; still : (k, 2) vertex and axis of prescribed velocities, wall : (vertices, 2) [m/s]
     steady, rising : (vertices, 2) forces [N/m]; the load is steady + drive[LOAD] * rising
     """
 
@@ -39,7 +39,7 @@ class Skeleton(NamedTuple):
     weight: np.ndarray
     follow: np.ndarray
     mass: np.ndarray
-    held: np.ndarray
+    still: np.ndarray
     wall: np.ndarray
     steady: np.ndarray
     rising: np.ndarray
@@ -83,24 +83,89 @@ def _moved(node, since):
 
 
 @kernel(error_model="numpy")
+def _move(x, v, mass, zone, joint, steady, rising, load, alpha, local, dt, still, wall, speed, reaction):
+    """New velocities and positions; returns kinetic energy, and the powers of damping, loads and walls.
+
+    still : (k, 2) vertex and axis of each prescribed velocity; they move freely in the first loop, which knows no
+    exceptions, and are put right after it.
+    """
+    slow = 1.0 - 0.5 * alpha * dt
+    fast = 1.0 / (1.0 + 0.5 * alpha * dt)
+    kinetic = 0.0
+    damped = 0.0
+    load_work = 0.0
+    wall_work = 0.0
+    for k in range(still.shape[0]):
+        i = still[k, 0]
+        d = still[k, 1]
+        # For now the old velocity is kept here.
+        reaction[i, d] = v[i, d]
+    for i in range(x.shape[0]):
+        push = dt / mass[i]
+        half = 0.5 * mass[i]
+        for d in range(2):
+            old = v[i, d]
+            applied = steady[i, d] + load * rising[i, d]
+            total = zone[i, d] + joint[i, d] + applied
+            if local > 0.0:
+                drag = local * abs(total)
+                if old < 0.0:
+                    drag = -drag
+                elif old == 0.0:
+                    drag = 0.0
+                new = (old * slow + (total - drag) * push) * fast
+                damped += 0.5 * drag * (old + new)
+            else:
+                new = (old * slow + total * push) * fast
+            mean = 0.5 * (old + new)
+            damped += 2.0 * alpha * half * mean * mean
+            load_work += applied * mean
+            kinetic += half * new * new
+            v[i, d] = new
+            x[i, d] += dt * new
+    for k in range(still.shape[0]):
+        i = still[k, 0]
+        d = still[k, 1]
+        old = reaction[i, d]
+        free = v[i, d]
+        mean = 0.5 * (old + free)
+        applied = steady[i, d] + load * rising[i, d]
+        total = zone[i, d] + joint[i, d] + applied
+        drag = 0.0
+        if local > 0.0 and old != 0.0:
+            drag = local * abs(total) if old > 0.0 else -local * abs(total)
+        damped -= (alpha * mass[i] * mean + drag) * mean
+        load_work -= applied * mean
+        new = wall[i, d] * speed
+        mean = 0.5 * (old + new)
+        # A wall also carries the inertia of what it moves.
+        reaction[i, d] = mass[i] * (new - old) / dt - total
+        wall_work += reaction[i, d] * mean
+        load_work += applied * mean
+        kinetic += 0.5 * mass[i] * (new * new - free * free)
+        v[i, d] = new
+        x[i, d] += dt * (new - free)
+    return kinetic, damped, load_work, wall_work
+
+
+@kernel(error_model="numpy")
 def advance(
     steps, skeleton, motion, pairs, joint, dt, skin, near, deepest, damping_ratio, damping_limit, local, fastest
 ):
-    """Up to `steps` steps of `dt` [s]. Returns (status, steps done, vertex or pair concerned).
+    """Up to `steps` steps of `dt` [s]. Returns (status, steps done, pair concerned).
 
     skin, near : reach of the candidates and of the active ones [m]; deepest : overlap limit [m]
     damping_ratio : adaptive global damping holds its power at this ratio to the rate of kinetic energy; below 0
     the damping coefficient in motion.drive stays as it is; damping_limit : its upper bound [1/s]
-    local : share of the unbalanced force taken off against the velocity; fastest : speed that stops the run [m/s]
+    local : share of the unbalanced force taken off against the velocity
+    fastest : kinetic energy that stops the run [J/m]
     """
     s = skeleton
     m = motion
     x = m.x
     v = m.v
-    nv = x.shape[0]
     rebuild_at = (0.5 * skin) ** 2
     choose_at = (0.5 * near) ** 2
-    fastest2 = fastest * fastest
     keep = 0.98
     check = 0
     for step in range(steps):
@@ -140,43 +205,25 @@ def advance(
         speed = m.drive[SPEED]
         m.drive[SPEED] = min(1.0, speed + m.drive[SPEED_STEP])
         alpha = m.drive[DAMPING]
-        slow = 1.0 - 0.5 * alpha * dt
-        fast = 1.0 / (1.0 + 0.5 * alpha * dt)
-        kinetic = 0.0
-        damped = 0.0
-        zone_work = 0.0
-        joint_work = 0.0
-        load_work = 0.0
-        wall_work = 0.0
-        for i in range(nv):
-            mass = s.mass[i]
-            v2 = 0.0
-            for d in range(2):
-                old = v[i, d]
-                applied = s.steady[i, d] + load * s.rising[i, d]
-                total = m.zone_force[i, d] + m.joint_force[i, d] + applied
-                if s.held[i, d] == 1:
-                    new = s.wall[i, d] * speed
-                    # A wall also carries the inertia of what it moves.
-                    m.reaction[i, d] = mass * (new - old) / dt - total
-                    mean = 0.5 * (old + new)
-                    wall_work += m.reaction[i, d] * mean
-                else:
-                    drag = 0.0
-                    if local > 0.0 and old != 0.0:
-                        drag = local * abs(total) if old > 0.0 else -local * abs(total)
-                    new = (old * slow + (total - drag) / mass * dt) * fast
-                    mean = 0.5 * (old + new)
-                    damped += (alpha * mass * mean + drag) * mean
-                v[i, d] = new
-                x[i, d] += dt * new
-                kinetic += 0.5 * mass * new * new
-                v2 += new * new
-                zone_work -= m.zone_force[i, d] * mean
-                joint_work -= m.joint_force[i, d] * mean
-                load_work += applied * mean
-            if not v2 < fastest2:
-                return RUNAWAY, step, i
+        kinetic, damped, load_work, wall_work = _move(
+            x,
+            v,
+            s.mass,
+            m.zone_force,
+            m.joint_force,
+            s.steady,
+            s.rising,
+            load,
+            alpha,
+            local,
+            dt,
+            s.still,
+            s.wall,
+            speed,
+            m.reaction,
+        )
+        if not kinetic < fastest:
+            return RUNAWAY, step, -1
         t = m.tally
         if damping_ratio >= 0.0:
             t[RATE_SEEN] = keep * t[RATE_SEEN] + (1.0 - keep) * abs(kinetic - t[KINETIC])
@@ -187,8 +234,6 @@ def advance(
                 m.drive[DAMPING] = max(alpha / 1.02, 1e-6 * damping_limit)
         t[KINETIC] = kinetic
         t[DAMPED] += damped * dt
-        t[ZONE_WORK] += zone_work * dt
-        t[JOINT_WORK] += joint_work * dt
         t[LOAD_WORK] += load_work * dt
         t[WALL_WORK] += wall_work * dt
     return DONE, steps, -1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from graben.mechanics.blocks.joints import FACING_NONE, LENGTH, OPEN, TX, TY, Pairs, X, Y, forget
+from graben.mechanics.blocks.joints import FACING_NONE, LENGTH, OPEN, RIM, TX, TY, Pairs, X, Y, forget
 from graben.mechanics.compiled import kernel
 
 
@@ -166,7 +166,7 @@ def choose_active(pairs, follow, node, reach, dilation, active):
             s1 = (node[f2, X] - ox) * tx + (node[f2, Y] - oy) * ty
             h0 = (node[f, X] - ox) * ty - (node[f, Y] - oy) * tx
             h1 = (node[f2, X] - ox) * ty - (node[f2, Y] - oy) * tx
-            length = min(se, s0) - max(0.0, s1)
+            length = min(se, s0) - max(0.0, s1) - node[e, RIM] - node[f, RIM]
             held = dilation * max(abs(pairs.slip[c, 0]), abs(pairs.slip[c, 1]))
             # A turn of the tangent shifts ends by at most their distance times the turn.
             far = reach * (1.0 + (abs(h0) + abs(h1)) / min(node[e, LENGTH], node[f, LENGTH]))
