@@ -142,3 +142,21 @@ def test_bad_scenes_are_refused(scene, setting, key):
         dem_run.run(scene, output, overrides=[setting])
     assert any(key in str(f) for f in refused.value.faults)
     assert not output.exists()
+
+
+def test_template_and_pipeline_scene_are_valid(tmp_path):
+    from pathlib import Path
+
+    from graben.schemas.scene import load_scene
+    from graben.schemas.template import template
+
+    path = tmp_path / "template.toml"
+    path.write_text(template("blocks"))
+    load_scene(path, "blocks")
+    granite = load_scene(
+        Path(__file__).parents[2] / "pipelines/upscaling/voronoi-granite.toml",
+        "blocks",
+        ['loading.confining_pressure="2 MPa"'],
+    )
+    assert granite.loading.confining_pressure == 2e6
+    assert granite.loading.states == 51
