@@ -91,7 +91,7 @@ def _plain_lines(every_s: float = 10.0) -> Callable[[float, str], None]:
         if now - last < every_s:
             return
         last = now
-        left = f", {(now - begun) * (1 - fraction) / fraction:.0f} s left" if fraction > 0 else ""
+        left = f", {(now - begun) * (1 - fraction) / fraction:.0f} s left" if fraction >= 0.02 else ""
         click.echo(f"{100 * fraction:5.1f} % after {now - begun:.0f} s{left}: {message}", err=True)
 
     return tell
