@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -92,20 +92,23 @@ def run(
     progress(0.01, f"{len(body.mesh.quads)} elements; gravity")
     newton = NewtonOptions(scene.stepping.tolerance, scene.stepping.max_iterations)
     settled = march(body, body.untouched(), lambda t: t * problem.steady, 0.0, 1.0, _GRAVITY_STEPS, newton)
-    if not settled.complete:
-        raise NumericsFailed(
-            f"no equilibrium beyond {100 * settled.time:.3g} % of gravity ({settled.reason})",
-            advice="the body does not stand under its own weight: check supports, strength and density",
-        )
     settling = problem.unit_pressure / problem.loaded_length
     history = History(scene, settled, settling, problem.loaded_length, problem.offset)
+    last_good = output.with_name(f"{output.stem}.last-good{output.suffix}")
+    if not settled.complete:
+        headline = {"failed": True, "failure_load_pa": None, "compliance_ratio": 1.0, "stiffness_ratio": 1.0}
+        partial = replace(problem, steady=settled.time * problem.steady)
+        write_run(last_good, record, scene, body, settled, history, problem.support_nodes, partial.external, headline)
+        raise NumericsFailed(
+            f"no equilibrium beyond {100 * settled.time:.3g} % of gravity ({settled.reason}); "
+            f"the state up to there is in {last_good}",
+            advice="the body does not stand under its own weight: check supports, strength and density",
+        )
     loaded = _load_up(scene, problem, settled, newton, history, progress)
     failed = not loaded.complete
     headline = _headline(scene, problem, settled, loaded, history)
     record.cost.update(_cost(body, settled, loaded, headline))
-    target = output
-    if failed and scene.stepping.goal == "end":
-        target = output.with_name(f"{output.stem}.last-good{output.suffix}")
+    target = last_good if failed and scene.stepping.goal == "end" else output
     progress(0.98, "writing")
     write_run(target, record, scene, body, settled, history, problem.support_nodes, problem.external, headline)
     if target != output:

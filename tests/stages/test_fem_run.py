@@ -198,11 +198,14 @@ def test_failing_where_the_end_is_the_goal_is_exit_3_and_keeps_the_last_state(tm
     assert check_artifact(tmp_path / "run.last-good.nc") == []
 
 
-def test_failing_under_gravity_is_exit_3_and_leaves_nothing(tmp_path):
+def test_failing_under_gravity_is_exit_3_and_keeps_the_last_state(tmp_path):
     result = invoke(tmp_path, "-q", "--set", 'gravity.vertical="-1 km/s^2"')
     assert result.exit_code == 3
     assert "% of gravity" in result.output and "its own weight" in result.output
-    assert [p.name for p in tmp_path.iterdir()] == ["run.toml"]
+    assert not (tmp_path / "run.nc").exists()
+    kept = read_artifact(tmp_path / "run.last-good.nc", "fem")
+    assert kept.sizes["time"] == 1
+    assert 0 < kept["reaction"].values[0, 1] < 2700 * 1000 * 12  # part of the weight
 
 
 @pytest.mark.parametrize(

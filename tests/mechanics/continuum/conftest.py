@@ -23,9 +23,10 @@ def grid():
 
     def make(width, height, nx, ny, bend=0.0):
         x, y = np.meshgrid(np.linspace(0, width, nx + 1), np.linspace(0, height, ny + 1), indexing="ij")
-        wave = np.sin(7.0 * np.arange(x.size).reshape(x.shape)) * bend
+        number = np.arange(x.size).reshape(x.shape)
+        wave = np.sin(7.0 * number) * bend
         x[1:-1, 1:-1] += (wave * width / nx)[1:-1, 1:-1]
-        y[1:-1, 1:-1] += (np.cos(5 * wave + x) * bend * height / ny)[1:-1, 1:-1]
+        y[1:-1, 1:-1] += (np.cos(5.0 * number) * bend * height / ny)[1:-1, 1:-1]
         ids = np.arange(x.size).reshape(x.shape)
         quads = np.stack([ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]], axis=-1).reshape(-1, 4)
         return QuadMesh(np.stack([x.ravel(), y.ravel()], axis=1), quads)

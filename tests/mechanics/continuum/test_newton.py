@@ -184,3 +184,31 @@ def test_softest_stiffness_equals_the_smallest_eigenvalue(block):
 def test_bad_steps_are_refused():
     with pytest.raises(ValueError, match="smallest <= first"):
         StepOptions(first=1.0, largest=0.5, smallest=0.1)
+
+
+@pytest.mark.parametrize(("length", "stress"), [(1e-6, 1.0), (1e4, 1.0), (1.0, 1e-6), (1e-3, 1e3)])
+def test_units_do_not_matter(length, stress, grid, body, material):
+    """The same body measured in other units of length and stress gives the same strains and the same rounds."""
+
+    def run(a, b):
+        mesh = grid(4.0 * a, 4.0 * a, 6, 6, bend=0.2)
+        values = {
+            k: v * b if k in ("young_modulus", "initial_yield", "hardening_gain") else v for k, v in GRANITE.items()
+        }
+        made = body(mesh, material("drucker-prager", **values), lambda x, y: (x == 0, y == 0))
+        unit, _ = edge_traction(mesh, np.array([0.0, 4.0 * a]), np.array([2.0 * a, 4.0 * a]))
+        return march(
+            made,
+            made.untouched(),
+            lambda t: 3e6 * b * t * unit,
+            0.0,
+            1.0,
+            StepOptions(0.25, 0.5, 0.01),
+            NewtonOptions(1e-8),
+        )
+
+    plain, scaled = run(1.0, 1.0), run(length, stress)
+    assert scaled.complete and scaled.iterations == plain.iterations
+    reference = plain.state.displacement
+    np.testing.assert_allclose(scaled.state.displacement / length, reference, atol=1e-6 * np.abs(reference).max())
+    np.testing.assert_allclose(scaled.state.internal[..., 0], plain.state.internal[..., 0], atol=1e-8)
