@@ -113,15 +113,15 @@ def _bearing(length, gap0, gap1, rim):
 
 
 @kernel(error_model="numpy")
-def forget(pairs, c):
+def forget(shear, flag, intact, c):
     """An open contact remembers no stress; what slid stays, and so does the mark of a broken joint."""
     for k in range(2):
-        pairs.shear[c, k] = 0.0
-        if pairs.flag[c, k] != BROKEN:
-            if pairs.intact[c] == 1 and pairs.flag[c, k] != OPEN:
-                pairs.flag[c, k] = BROKEN
+        shear[c, k] = 0.0
+        if flag[c, k] != BROKEN:
+            if intact[c] == 1 and flag[c, k] != OPEN:
+                flag[c, k] = BROKEN
             else:
-                pairs.flag[c, k] = OPEN
+                flag[c, k] = OPEN
 
 
 @kernel(error_model="numpy")
@@ -132,6 +132,11 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
     deepest : overlap above which a touching pair stops the run, and others are no contact [m]
     sums : [friction work, largest overlap]; the work that dilation gives back is not friction
     """
+    # Taken out of the tuple once: inside the loop each look-up would count references.
+    first, second, shears, slips = pairs.first, pairs.second, pairs.shear, pairs.slip
+    flags, live, intact = pairs.flag, pairs.live, pairs.intact
+    cohesion, friction, dilation, limit = joint.cohesion, joint.friction, joint.dilation, joint.dilation_limit
+    tensile = joint.tension
     kn = joint.normal_stiffness
     ks = joint.shear_stiffness
     compliance = 1.0 / ks
@@ -140,16 +145,16 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
     largest = 0.0
     for m in range(active.shape[0]):
         c = active[m]
-        e = pairs.first[c]
-        f = pairs.second[c]
+        e = first[c]
+        f = second[c]
         # Difference of the unit tangents: along the common tangent, of length sqrt(2 + 2 facing).
         tx = node[e, TX] - node[f, TX]
         ty = node[e, TY] - node[f, TY]
         facing = 0.5 * (tx * tx + ty * ty) - 1.0
         if facing <= FACING_NONE:
-            if pairs.live[c] == 1:
-                forget(pairs, c)
-                pairs.live[c] = 0
+            if live[c] == 1:
+                forget(shears, flags, intact, c)
+                live[c] = 0
             continue
         f2 = follow[f]
         ox = node[e, X]
@@ -163,20 +168,20 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
         rim = node[e, RIM] + node[f, RIM]
         # Lengths are still stretched by sqrt(2 + 2 facing), at least sqrt(3).
         if high - low <= 1.7 * rim:
-            if pairs.live[c] == 1:
-                forget(pairs, c)
-                pairs.live[c] = 0
+            if live[c] == 1:
+                forget(shears, flags, intact, c)
+                live[c] = 0
             continue
         # Heights along the normal n = (ty, -tx), which points out of edge e.
         he = node[e, LENGTH] * (node[e, TX] * ty - node[e, TY] * tx)
         h0 = (node[f, X] - ox) * ty - (node[f, Y] - oy) * tx
         h1 = (node[f2, X] - ox) * ty - (node[f2, Y] - oy) * tx
         apart = min(h0, h1) > max(0.0, he)
-        if apart and pairs.intact[c] == 0 and pairs.slip[c, 0] == 0.0 and pairs.slip[c, 1] == 0.0:
+        if apart and intact[c] == 0 and slips[c, 0] == 0.0 and slips[c, 1] == 0.0:
             # Most chamfers end here, before any root or division.
-            if pairs.live[c] == 0 or pairs.flag[c, 0] != OPEN or pairs.flag[c, 1] != OPEN:
-                forget(pairs, c)
-                pairs.live[c] = 1
+            if live[c] == 0 or flags[c, 0] != OPEN or flags[c, 1] != OPEN:
+                forget(shears, flags, intact, c)
+                live[c] = 1
             continue
         e2 = follow[e]
         scale = 1.0 / np.sqrt(2.0 + 2.0 * facing)
@@ -196,12 +201,12 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
         gap1 = h1 + (h0 - h1) * (high - s1) * df - he * high * de
         overlap = -0.5 * (gap0 + gap1)
         if overlap > deepest:
-            if pairs.live[c] == 1:
+            if live[c] == 1:
                 sums[0] += friction_work
                 sums[1] = overlap
                 return c
             continue
-        pairs.live[c] = 1
+        live[c] = 1
         area = 0.5 * _bearing(length, gap0, gap1, rim)
         if facing < FACING_FULL:
             area *= (facing - FACING_NONE) / (FACING_FULL - FACING_NONE)
@@ -216,14 +221,14 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
         for k in range(2):
             s = low if k == 0 else high
             gap = gap0 if k == 0 else gap1
-            slip = pairs.slip[c, k]
-            open_by_dilation = joint.dilation * min(abs(slip), joint.dilation_limit)
+            slip = slips[c, k]
+            open_by_dilation = dilation * min(abs(slip), limit)
             sigma = kn * (open_by_dilation - gap)
-            tension = joint.tension if pairs.intact[c] == 1 and pairs.flag[c, k] != BROKEN else 0.0
+            tension = tensile if intact[c] == 1 and flags[c, k] != BROKEN else 0.0
             if sigma <= -tension:
-                pairs.shear[c, k] = 0.0
-                if pairs.flag[c, k] != BROKEN:
-                    pairs.flag[c, k] = BROKEN if pairs.intact[c] == 1 and tension > 0.0 else OPEN
+                shears[c, k] = 0.0
+                if flags[c, k] != BROKEN:
+                    flags[c, k] = BROKEN if intact[c] == 1 and tension > 0.0 else OPEN
                 continue
             alpha = s * de
             beta = (s0 - s) * df
@@ -231,8 +236,8 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
             vx -= (1.0 - alpha) * node[e, VX] + alpha * node[e2, VX]
             vy = (1.0 - beta) * node[f, VY] + beta * node[f2, VY]
             vy -= (1.0 - alpha) * node[e, VY] + alpha * node[e2, VY]
-            tau = pairs.shear[c, k] + ksdt * (vx * tx + vy * ty)
-            strength = joint.cohesion + sigma * joint.friction
+            tau = shears[c, k] + ksdt * (vx * tx + vy * ty)
+            strength = cohesion + sigma * friction
             if strength < 0.0:
                 strength = 0.0
             flag = STICK
@@ -240,14 +245,14 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
                 limited = strength if tau > 0.0 else -strength
                 slid = (tau - limited) * compliance
                 slip += slid
-                opened = joint.dilation * min(abs(slip), joint.dilation_limit) - open_by_dilation
+                opened = dilation * min(abs(slip), limit) - open_by_dilation
                 friction_work += (limited * slid - sigma * opened) * area
                 tau = limited
-                pairs.slip[c, k] = slip
+                slips[c, k] = slip
                 flag = SLIP
-            if pairs.flag[c, k] != BROKEN:
-                pairs.flag[c, k] = flag
-            pairs.shear[c, k] = tau
+            if flags[c, k] != BROKEN:
+                flags[c, k] = flag
+            shears[c, k] = tau
             if -gap > largest:
                 largest = -gap
             # Traction on edge e: -sigma n + tau t, at a point midway between the edges. Seen from a point of

@@ -108,7 +108,7 @@ class BlockModel:
         )
         size = float(np.sqrt(np.median(bodies.block_area)))
         self.block_size = size
-        self.reach = 0.15 * size
+        self.reach = 0.08 * size
         self.near = 0.002 * size
         self.deepest = 0.1 * size
         self.motion = rx.Motion(

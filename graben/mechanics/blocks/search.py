@@ -141,12 +141,14 @@ def choose_active(pairs, follow, node, reach, dilation, active):
     Active pairs come sorted by what they are now (closed, facing with a gap, beside each other, turned away), so that
     branches of the contact kernel are taken in runs.
     """
-    n = pairs.key.shape[0]
+    first, second, slips, flags = pairs.first, pairs.second, pairs.slip, pairs.flag
+    shears, live, intact = pairs.shear, pairs.live, pairs.intact
+    n = first.shape[0]
     kind = np.empty(n, dtype=np.int64)
     total = np.zeros(5, dtype=np.int64)
     for c in range(n):
-        e = pairs.first[c]
-        f = pairs.second[c]
+        e = first[c]
+        f = second[c]
         facing = -(node[e, TX] * node[f, TX] + node[e, TY] * node[f, TY])
         slack = 2.0 * reach / min(node[e, LENGTH], node[f, LENGTH])
         sort = 3
@@ -167,7 +169,7 @@ def choose_active(pairs, follow, node, reach, dilation, active):
             h0 = (node[f, X] - ox) * ty - (node[f, Y] - oy) * tx
             h1 = (node[f2, X] - ox) * ty - (node[f2, Y] - oy) * tx
             length = min(se, s0) - max(0.0, s1) - node[e, RIM] - node[f, RIM]
-            held = dilation * max(abs(pairs.slip[c, 0]), abs(pairs.slip[c, 1]))
+            held = dilation * max(abs(slips[c, 0]), abs(slips[c, 1]))
             # A turn of the tangent shifts ends by at most their distance times the turn.
             far = reach * (1.0 + (abs(h0) + abs(h1)) / min(node[e, LENGTH], node[f, LENGTH]))
             if length < -2.0 * far or min(h0, h1) - max(0.0, rise) > 2.0 * far + held:
@@ -176,13 +178,13 @@ def choose_active(pairs, follow, node, reach, dilation, active):
                 sort = 3
             elif length <= 0.0:
                 sort = 2
-            elif pairs.flag[c, 0] >= OPEN and pairs.flag[c, 1] >= OPEN:
+            elif flags[c, 0] >= OPEN and flags[c, 1] >= OPEN:
                 sort = 1
             else:
                 sort = 0
         if sort == 4:
-            forget(pairs, c)
-            pairs.live[c] = 0
+            forget(shears, flags, intact, c)
+            live[c] = 0
         kind[c] = sort
         total[sort] += 1
     place = np.zeros(5, dtype=np.int64)
