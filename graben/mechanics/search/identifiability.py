@@ -1,11 +1,19 @@
 """What the data can tell about the parameters at an optimum, and what they cannot.
 
 With residuals r (m,) and their Jacobian J (m, k) in the unit box, the usual linear estimate of the covariance
-is s^2 (J^T J)^-1, s^2 = r.r / (m - k). Residuals along one curve are not independent (a slip event moves many
-points at once), so a second estimate lets residuals within a curve be correlated in any way up to a lag
-(Newey-West weights): it is the one to quote. Each right singular vector of J is a combination of parameters;
-its standard deviation is s over the singular value. A combination whose standard deviation exceeds what the
-bounds alone give (1/sqrt(12) of the range) is unseen by the data.
+is s^2 (J^T J)^-1, s^2 = r.r / (m - k). Two things are added to it.
+
+The bounds: a parameter that the data do not see would get an error beyond its own range, and spoil those that
+it is correlated with. So the bounds enter as the precision 12 I of a uniform distribution over each range:
+covariance (J^T J / s^2 + 12 I)^-1. Where the data see much, nothing changes.
+
+Correlation: residuals along one curve are not independent (a slip event moves many points at once). The
+robust errors let residuals within a curve be correlated in any way up to a lag (Newey-West weights): they are
+the ones to quote.
+
+Each right singular vector of J is a combination of parameters; its standard deviation from the data alone is
+s over the singular value. A combination whose standard deviation exceeds what the bounds alone give
+(1/sqrt(12) of the range) is unseen by the data.
 """
 
 from __future__ import annotations
@@ -24,10 +32,10 @@ UNSEEN = 12.0**-0.5  # standard deviation of a uniform distribution over the ran
 class Identifiability:
     """Linear uncertainty at an optimum; all in the unit box (fractions of each parameter's range).
 
-    free (k,) false where a bound holds the parameter (it is left out of the rest); standard_error,
-    covariance, correlation: (k,), (k, k), (k, k), nan where not free or not identifiable; robust_error (k,):
-    with correlated residuals; identifiable (k,): the data narrow the parameter down beyond its bounds;
-    direction_error (j,), directions (j, k): of the combinations, worst seen first; unseen (j,).
+    free (k,) false where a bound holds the parameter (it is left out of the rest);
+    standard_error, covariance, correlation: (k,), (k, k), (k, k), nan where not free; robust_error (k,): with
+    correlated residuals; identifiable (k,): free, and the data at least halve what the bounds leave open;
+    direction_error (j,), directions (j, k): of the combinations, worst seen first, inf where flat; unseen (j,).
     """
 
     free: NDArray[np.bool_]
@@ -49,61 +57,53 @@ def identify(
     groups: NDArray[np.int64] | None = None,
     lag: int = 0,
     edge: float = 1e-6,
+    bounded: bool = True,
 ) -> Identifiability:
     """Analyse an optimum x (k,) with residuals (m,) and jacobian (m, k), both from the unit box.
 
     groups (m,) numbers the curve and quantity a residual belongs to, in order along it; residuals of one
     group are taken as correlated up to `lag` points apart. edge: nearer to a bound than this counts as held
-    by it.
+    by it. bounded: the bounds count as knowledge (without, a direction that the data do not see makes the
+    covariance singular).
     """
     k = x.size
     if jacobian.shape != (residuals.size, k):
         raise ValueError(f"jacobian: expected ({residuals.size}, {k}), found {jacobian.shape}")
     free = (x > edge) & (x < 1.0 - edge)
     index = np.flatnonzero(free)
-    j = jacobian[:, index]
-    nan = np.full((k, k), np.nan)
-    empty = Identifiability(
-        free, nan[0].copy(), nan[0].copy(), nan.copy(), nan.copy(), np.zeros(k, bool), np.empty(0),
-        np.empty((0, k)),
-        np.empty(0, bool),
-    )  # fmt: skip
+    error, robust_error = np.full(k, np.nan), np.full(k, np.nan)
+    covariance, correlation = np.full((k, k), np.nan), np.full((k, k), np.nan)
+    known = np.zeros(k, bool)
     if index.size == 0:
-        return empty
+        none = np.empty(0)
+        return Identifiability(
+            free, error, robust_error, covariance, correlation, known, none, np.empty((0, k)), none.astype(bool)
+        )
+    j = jacobian[:, index]
     freedom = max(1, residuals.size - index.size)
-    s = float(np.sqrt(residuals @ residuals / freedom))
-    _u, values, vt = np.linalg.svd(j, full_matrices=False)
-    floor = 1e-10 * max(values.max(), 1e-300)
-    seen = values > floor
-    spread = np.where(seen, s / np.maximum(values, floor), np.inf)
-    # a flat direction is known no better than the bounds, however small the residuals are
-    unseen = (spread > UNSEEN) | ~seen
-    inverse = (vt[seen].T / values[seen] ** 2) @ vt[seen]
-    covariance = s * s * inverse
-    meat = _meat(j, residuals, groups, lag)
-    robust = inverse @ meat @ inverse * residuals.size / freedom
-    lost = (vt[~seen] ** 2).sum(axis=0) > 1e-6
-    errors = np.sqrt(np.diag(covariance))
-    robust_errors = np.sqrt(np.maximum(np.diag(robust), 0.0))
-    identifiable = ~lost & (errors < UNSEEN)
-    errors = np.where(lost, np.nan, errors)
-    robust_errors = np.where(lost, np.nan, robust_errors)
-    correlation = covariance / np.maximum(
-        np.outer(np.sqrt(np.diag(covariance)), np.sqrt(np.diag(covariance))), 1e-300
-    )
-    correlation[lost], correlation[:, lost] = np.nan, np.nan
-    order = np.argsort(-spread, kind="stable")
-    directions = np.zeros((index.size, k))
-    directions[:, index] = vt[order]
-    flip = np.sign(directions[np.arange(index.size), np.abs(directions).argmax(axis=1)])
-    directions *= flip[:, None]  # the largest entry positive: the sign of a singular vector is arbitrary
+    # a perfect fit leaves no scatter to judge by; rounding is then the scatter
+    s2 = max(float(residuals @ residuals) / freedom, 1e-30)
+    prior = np.eye(index.size) / UNSEEN**2 if bounded else np.zeros((index.size, index.size))
+    inverse = np.linalg.inv(j.T @ j / s2 + prior)
+    meat = _meat(j, residuals, groups, lag) * (residuals.size / freedom) / s2**2 + prior
+    robust = inverse @ meat @ inverse
+    deviation = np.sqrt(np.diag(inverse))
     full = np.ix_(index, index)
-    out_cov, out_cor = nan.copy(), nan.copy()
-    out_cov[full], out_cor[full] = covariance, correlation
-    out_error, out_robust, out_known = nan[0].copy(), nan[0].copy(), np.zeros(k, bool)
-    out_error[index], out_robust[index], out_known[index] = errors, robust_errors, identifiable
+    covariance[full], correlation[full] = inverse, inverse / np.outer(deviation, deviation)
+    error[index] = deviation
+    # neither estimate may claim less than the other by chance: a few slips can make the sandwich too small
+    robust_error[index] = np.maximum(np.sqrt(np.maximum(np.diag(robust), 0.0)), deviation)
+    known[index] = robust_error[index] < 0.5 * UNSEEN
+    _u, values, vt = np.linalg.svd(j, full_matrices=False)
+    seen = values > 1e-10 * max(values.max(), 1e-300)
+    spread = np.where(seen, np.sqrt(s2) / np.maximum(values, 1e-300), np.inf)
+    order = np.argsort(-spread, kind="stable")
+    directions = np.zeros((order.size, k))
+    directions[:, index] = vt[order]
+    flip = np.sign(directions[np.arange(order.size), np.abs(directions).argmax(axis=1)])
+    directions *= flip[:, None]  # the largest entry positive: the sign of a singular vector is arbitrary
     return Identifiability(
-        free, out_error, out_robust, out_cov, out_cor, out_known, spread[order], directions, unseen[order]
+        free, error, robust_error, covariance, correlation, known, spread[order], directions, spread[order] > UNSEEN
     )
 
 
