@@ -105,9 +105,7 @@ def main() -> None:
     curves = [
         Curve(f"{i}", response.stress[i, ::4], response.strain[i, ::4]) for i in range(0, 100, 25)
     ]  # 51 points, as in the reference curves
-    free = ["young_modulus", "poisson_ratio", "friction_angle", "dilation_angle", "flow_stress_ratio", "initial_yield",
-            "hardening_gain", "hardening_rate", "initiation_strain_050", "initiation_strain_060",
-            "failure_displacement"]  # fmt: skip
+    free = [name for name in DP | DAMAGE if name != "damage"]
     centre = np.array([{**DP, **DAMAGE}[n] for n in free])
     low, high = centre / 3.0, centre * 3.0
     high[[1, 2, 3]], low[4], high[4] = [0.45, 1.15, 1.0], 0.78, 1.0

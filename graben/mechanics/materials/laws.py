@@ -37,8 +37,9 @@ from graben.mechanics.materials.elastic import ELASTIC, update_elastic
 from graben.mechanics.materials.erve import ERVE, update_erve
 from graben.mechanics.materials.j2 import J2, update_j2
 from graben.mechanics.materials.law import UNKNOWN_LAW, Law
+from graben.mechanics.materials.mohr_coulomb import MOHR_COULOMB, update_mohr_coulomb
 
-_RECORDS: tuple[Law, ...] = (ELASTIC, J2, DRUCKER_PRAGER, ERVE)
+_RECORDS: tuple[Law, ...] = (ELASTIC, J2, MOHR_COULOMB, DRUCKER_PRAGER, ERVE)
 
 LAWS: dict[str, Law] = {record.name: record for record in _RECORDS}
 
@@ -50,6 +51,8 @@ def update(law_id, deps, sig, state, par, length, tangent):
         return update_drucker_prager(deps, sig, state, par, length, tangent)
     if law_id == 1:
         return update_j2(deps, sig, state, par, length, tangent)
+    if law_id == 2:
+        return update_mohr_coulomb(deps, sig, state, par, length, tangent)
     if law_id == 5:
         return update_erve(deps, sig, state, par, length, tangent)
     if law_id == 0:

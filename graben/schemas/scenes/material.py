@@ -44,6 +44,13 @@ _HARDENING = {
 UNITS: dict[str, dict[str, str]] = {
     "elastic": {**_ELASTIC},
     "j2": {**_ELASTIC, "hardening": "table"},
+    "mohr-coulomb": {
+        **_ELASTIC,
+        "friction_angle": "rad",
+        "dilation_angle": "rad",
+        "cohesion": "Pa",
+        "tensile_strength": "Pa",
+    },
     "drucker-prager": {
         **_ELASTIC,
         "friction_angle": "rad",
