@@ -40,6 +40,10 @@ test: $(READY) ## the tests (under 12 minutes, compilation included)
 verify: $(READY) ## the long verification against closed forms
 	$(BIN)/python -m pytest -m verify
 
+.PHONY: verify-udec
+verify-udec: $(READY) ## 16 tessellations of voronoi-granite against UDEC's curves (16 CPU minutes)
+	$(BIN)/python pipelines/upscaling/verify_udec.py $(RESULTS)/verify --picture docs/images/udec-band.png
+
 .PHONY: bench
 bench: $(READY) ## the benchmarks; JSON lines in results/bench/
 	@mkdir -p $(RESULTS)/bench
