@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import json
 import logging
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -25,6 +27,7 @@ class Tool(click.Command):
     """A click command whose failures become exit codes 2, 3 and 130, never a traceback without --debug."""
 
     def invoke(self, ctx: click.Context) -> Any:
+        _end_as_interrupted()
         try:
             return super().invoke(ctx)
         except (click.ClickException, click.exceptions.Exit, click.Abort):
@@ -44,6 +47,16 @@ class Tool(click.Command):
             for line in lines:
                 click.echo(f"{name}: {line}", err=True)
             ctx.exit(code)
+
+
+def _end_as_interrupted() -> None:
+    """Let SIGTERM (make and schedulers send it) unwind like Ctrl-C, so that half-made files are removed."""
+
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, interrupt)
 
 
 @dataclass(frozen=True)

@@ -69,9 +69,10 @@ def _three(vectors: np.ndarray) -> np.ndarray:
 class VtuSeries:
     """VTU files of a run in the folder ``NAME.vtu/`` and a ``NAME.pvd`` beside it, written last.
 
-    >>> series = VtuSeries("results/run.nc")            # doctest: +SKIP
-    >>> series.add(0.0, points, {"triangle": triangles})  # doctest: +SKIP
-    >>> series.close()                                   # doctest: +SKIP
+    >>> with VtuSeries("results/run.nc") as series:          # doctest: +SKIP
+    ...     series.add(0.0, points, {"triangle": triangles})
+
+    Leaving the block puts the files in place; leaving it by an exception leaves nothing.
     """
 
     def __init__(self, artifact: str | Path) -> None:
@@ -81,6 +82,15 @@ class VtuSeries:
         self._building = artifact.with_name(f".{artifact.stem}.part.vtu")
         shutil.rmtree(self._building, ignore_errors=True)
         self._times: list[float] = []
+
+    def __enter__(self) -> VtuSeries:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: object, trace: object) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self.discard()
 
     def add(
         self,

@@ -137,8 +137,7 @@ def write_run(
         "compliance_ratio": headline["compliance_ratio"],
         "stiffness_ratio": headline["stiffness_ratio"],
     }
-    series = VtuSeries(path)
-    try:
+    with VtuSeries(path) as series:
         for k, time in enumerate(times):
             fields = {
                 "stress": _six(stress[k]),
@@ -151,10 +150,6 @@ def write_run(
             points = {"displacement": movement[k], "gravity_displacement": gravity}
             series.add(time, mesh.points, {"quad": mesh.quads}, points, fields)
         write_artifact(path, LAYOUT, arrays, record, attributes)
-        series.close()
-    except BaseException:
-        series.discard()
-        raise
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:

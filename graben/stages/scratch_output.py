@@ -126,15 +126,10 @@ def write_run(
     output: Path, record: Record, scene: ScratchScene, mesh: HexMesh, result: ScratchRun, groove: Groove
 ) -> None:
     """Write the artifact, and the VTU series before it (so that the artifact stands for a whole result)."""
-    series = VtuSeries(output)
-    try:
+    with VtuSeries(output) as series:
         for frame in result.frames:
             points, cells, point_data, cell_data = fields(mesh, frame)
             series.add(frame.time, points, cells, point_data, cell_data)
-        series.close()
-    except BaseException:
-        series.discard()
-        raise
     head = groove.headline
     arrays: dict[str, Any] = {
         "groove_area": head["groove_area_m2"],
