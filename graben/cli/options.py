@@ -173,6 +173,15 @@ def session_options(function: Callable[..., None]) -> Callable[..., None]:
     return _renamed(wrapped, function)
 
 
+def cluster_option(function: Callable[..., None]) -> Callable[..., None]:
+    """--cluster ADDRESS; the command receives `cluster`."""
+    return click.option(
+        "--cluster",
+        metavar="ADDRESS",
+        help="Share the work over a Dask cluster, e.g. tcp://10.0.0.1:8786 (pip install 'graben[cluster]').",
+    )(function)
+
+
 def set_option(function: Callable[..., None]) -> Callable[..., None]:
     """--set KEY=VALUE, repeatable; the command receives `overrides`, a tuple of strings."""
     return click.option(

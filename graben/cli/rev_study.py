@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from graben.cli.options import FILE, Session, Tool, set_option, stage_options
+from graben.cli.options import FILE, Session, Tool, cluster_option, set_option, stage_options
 
 
 @click.command("rev-study", cls=Tool)
@@ -19,6 +19,7 @@ from graben.cli.options import FILE, Session, Tool, set_option, stage_options
 )
 @click.option("--grid", type=int, help="Centres per side of a square grid.")
 @click.option("--processes", type=int, help="Processes that share the work (0: one per core).")
+@cluster_option
 @set_option
 @stage_options
 def main(
@@ -28,6 +29,7 @@ def main(
     radii: tuple[str, ...],
     grid: int | None,
     processes: int | None,
+    cluster: str | None,
     overrides: tuple[str, ...],
     output: Path,
     overwrite: bool,
@@ -49,5 +51,5 @@ def main(
         short.append(f"processes={processes}")
     study = load_scene(scene, "rev-study", short) if scene else default_scene("rev-study", short)
     with session.progress() as progress:
-        headline = rev_study.run(inputs, study, output, overwrite=overwrite, progress=progress)
+        headline = rev_study.run(inputs, study, output, cluster=cluster, overwrite=overwrite, progress=progress)
     session.report(headline)

@@ -28,6 +28,9 @@ class BadInput(ValueError):
         self.faults: list[Fault] = [faults] if isinstance(faults, Fault) else list(faults)
         super().__init__("\n".join(str(f) for f in self.faults))
 
+    def __reduce__(self) -> tuple[type[BadInput], tuple[list[Fault]]]:
+        return BadInput, (self.faults,)  # as it is when it comes from a worker process
+
 
 class NotFinite(ArithmeticError):
     """A result to be written holds nan or infinity where its layout allows none. Exit code 3."""

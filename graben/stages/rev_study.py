@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +26,9 @@ from graben.schemas.layouts.rev_study import LAYOUT
 from graben.schemas.scenes.rev_study import RevStudyScene
 from graben.stages.block_history import Run, read_run
 from graben.stages.record import Progress, Record, silent
+from graben.stages.workers import compute
 
 RESAMPLES = {"draft": 500, "standard": 2000, "reference": 20_000}
-_ATTEMPTS = 3
 
 # One chunk of samples: the file, and its (radius, x, y); one result each: stress, strain, area, blocks.
 Chunk = tuple[Path, list[tuple[float, float, float]]]
@@ -42,10 +40,18 @@ def run(
     scene: RevStudyScene,
     output: Path,
     *,
+    cluster: str | None = None,
     overwrite: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Average every run at every radius and centre; test which radius is large enough.
+
+    Parameters
+    ----------
+    inputs : artifacts of kind "blocks"
+    scene : radii, places, tests
+    output : artifact of kind "rev-study"
+    cluster : address of a Dask scheduler whose workers take the samples; they read the inputs themselves
 
     Returns
     -------
@@ -61,7 +67,7 @@ def run(
     record = Record.begin(scene, inputs=inputs)
     centres = _centres(runs, scene)
     chunks = _chunks(runs, centres, scene)
-    samples = _sampled(chunks, scene.processes or os.cpu_count() or 1, progress)
+    samples = _sampled(chunks, scene.processes or os.cpu_count() or 1, cluster, progress)
     arrays = _arrays(runs, centres, samples, scene)
     criteria = Criteria(
         scene.tests.confidence,
@@ -94,7 +100,7 @@ def run(
     arrays["recommended_radius"] = advice.radius or 0.0
     record.cost |= {
         "samples": int(arrays["area"].size),
-        "processes": scene.processes or os.cpu_count() or 1,
+        **({"cluster": cluster} if cluster else {"processes": scene.processes or os.cpu_count() or 1}),
     }
     attributes = {
         "reason": advice.reason,
@@ -206,37 +212,14 @@ def sample_chunk(chunk: Chunk) -> list[Sample]:
     return results
 
 
-def _sampled(chunks: list[Chunk], processes: int, progress: Progress) -> list[Sample]:
-    """All samples in the order of the chunks, whatever the number of processes and their fate."""
-    results = computed(sample_chunk, chunks, processes, lambda f: progress(0.1 + 0.9 * f, "averaging"))
+def _sampled(chunks: list[Chunk], processes: int, cluster: str | None, progress: Progress) -> list[Sample]:
+    """All samples in the order of the chunks, whatever the number of workers and their fate."""
+    if cluster is not None:
+        chunks = [(path.resolve(), places) for path, places in chunks]
+    results = compute(
+        sample_chunk, chunks, processes, lambda f: progress(0.1 + 0.9 * f, "averaging"), cluster=cluster
+    )
     return [sample for part in results for sample in part]
-
-
-def computed(
-    work: Callable[[Any], Any], tasks: Sequence[Any], processes: int, done: Callable[[float], None]
-) -> list[Any]:
-    """`work` of every task, in order, in worker processes; what a killed worker had not finished is done again."""
-    results: dict[int, Any] = {}
-    if processes == 1 or len(tasks) == 1:
-        for k, task in enumerate(tasks):
-            results[k] = work(task)
-            done(len(results) / len(tasks))
-        return [results[k] for k in range(len(tasks))]
-    for attempt in range(_ATTEMPTS):
-        left = [k for k in range(len(tasks)) if k not in results]
-        if not left:
-            break
-        with ProcessPoolExecutor(min(processes, len(left))) as pool:
-            futures: dict[int, Future[Any]] = {k: pool.submit(work, tasks[k]) for k in left}
-            for k, future in futures.items():
-                try:
-                    results[k] = future.result()
-                except BrokenProcessPool:
-                    if attempt == _ATTEMPTS - 1:
-                        raise
-                    continue
-                done(len(results) / len(tasks))
-    return [results[k] for k in range(len(tasks))]
 
 
 def _arrays(runs: list[Run], centres: np.ndarray, samples: list[Sample], scene: RevStudyScene) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 import importlib.util
 import json
-import os
 import sys
 from functools import cache
 from pathlib import Path
@@ -244,19 +243,16 @@ def test_rev_study_over_runs(folder, tmp_path):
     assert data.identical(two.assign_attrs(data.attrs))
 
 
-def die_once(task):
-    """A worker that is killed at its first task."""
-    marker, value = task
-    if value == 2 and not marker.exists():
-        marker.touch()
-        os.kill(os.getpid(), 9)
-    return value * 10
-
-
-def test_a_killed_worker_loses_nothing(tmp_path):
-    tasks = [(tmp_path / "died", v) for v in range(6)]
-    assert rev_study.computed(die_once, tasks, 2, lambda f: None) == [0, 10, 20, 30, 40, 50]
-    assert (tmp_path / "died").exists()
+def test_rev_study_on_a_cluster(folder, tmp_path):
+    """The samples of a Dask cluster are those of this process, bit by bit."""
+    distributed = pytest.importorskip("distributed")
+    rev_study.run([folder / "dem0.nc"], small_scene("processes=1"), tmp_path / "one.nc")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", memory_limit=0
+    ) as local:
+        rev_study.run([folder / "dem0.nc"], small_scene(), tmp_path / "two.nc", cluster=local.scheduler_address)
+    one, two = (read_artifact(tmp_path / f"{n}.nc", "rev-study") for n in ("one", "two"))
+    assert one.identical(two.assign_attrs(one.attrs))
 
 
 def test_rev_study_faults(folder, tmp_path):

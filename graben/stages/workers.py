@@ -1,0 +1,134 @@
+"""Tasks over worker processes of this machine, or over the workers of a Dask cluster.
+
+Results come in the order of the tasks, so they do not depend on how many workers there are; what a lost worker had
+not finished is done again by another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import TYPE_CHECKING, Any
+
+from graben.schemas.faults import BadInput, Fault
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+Done = Callable[[float], None]
+
+_ATTEMPTS = 3
+_PATIENCE_S = 60.0  # a cluster without any worker for so long is given up
+
+
+def compute(
+    work: Callable[[Any], Any],
+    tasks: Sequence[Any],
+    processes: int = 1,
+    done: Done = lambda fraction: None,
+    *,
+    cluster: str | None = None,
+    patience_s: float = _PATIENCE_S,
+) -> list[Any]:
+    """`work` of every task, in the order of the tasks.
+
+    Parameters
+    ----------
+    work : a function of a module (workers import it); files that it reads must be there for each worker
+    tasks : what it is called with
+    processes : worker processes on this machine; 1 computes in this one. Not used with a cluster
+    done : told the finished fraction
+    cluster : address of a Dask scheduler, such as "tcp://10.0.0.1:8786"
+    patience_s : seconds to wait for a scheduler, and for workers where there are none
+
+    Raises
+    ------
+    BadInput : no Dask here, no scheduler at the address, or no worker there
+    BrokenProcessPool : a task whose worker was lost three times
+    whatever `work` raises
+    """
+    if not tasks:
+        return []
+    if cluster is not None:
+        return _on_cluster(work, tasks, done, cluster, patience_s)
+    if processes == 1 or len(tasks) == 1:
+        results = []
+        for task in tasks:
+            results.append(work(task))
+            done(len(results) / len(tasks))
+        return results
+    return _in_processes(work, tasks, processes, done)
+
+
+def _in_processes(work: Callable[[Any], Any], tasks: Sequence[Any], processes: int, done: Done) -> list[Any]:
+    results: dict[int, Any] = {}
+    for attempt in range(_ATTEMPTS):
+        left = [k for k in range(len(tasks)) if k not in results]
+        if not left:
+            break
+        with ProcessPoolExecutor(min(processes, len(left))) as pool:
+            futures: dict[int, Future[Any]] = {k: pool.submit(work, tasks[k]) for k in left}
+            for k, future in futures.items():
+                try:
+                    results[k] = future.result()
+                except BrokenProcessPool:
+                    if attempt == _ATTEMPTS - 1:
+                        raise
+                    continue
+                done(len(results) / len(tasks))
+    return [results[k] for k in range(len(tasks))]
+
+
+def _on_cluster(
+    work: Callable[[Any], Any], tasks: Sequence[Any], done: Done, address: str, patience_s: float
+) -> list[Any]:
+    """The scheduler gives the tasks of a lost worker to another; one that killed its workers is asked for again."""
+    client = _client(address, patience_s)
+    from distributed import KilledWorker, wait
+
+    results: dict[int, Any] = {}
+    with client:
+        _await_worker(client, address, patience_s)
+        asked = dict.fromkeys(range(len(tasks)), 1)
+        # One by one, so that tasks need not be hashable, and none is taken for another (pure).
+        futures = {k: client.submit(work, task, pure=False) for k, task in enumerate(tasks)}
+        while futures:
+            try:
+                wait(list(futures.values()), timeout=patience_s, return_when="FIRST_COMPLETED")
+            except TimeoutError:
+                _await_worker(client, address, patience_s)  # slow tasks are no fault, no worker is
+                continue
+            for k in [k for k, future in futures.items() if future.done()]:
+                try:
+                    results[k] = futures.pop(k).result()
+                except KilledWorker:
+                    if asked[k] == _ATTEMPTS:
+                        raise
+                    asked[k] += 1
+                    futures[k] = client.submit(work, tasks[k], pure=False)
+                    continue
+                done(len(results) / len(tasks))
+    return [results[k] for k in range(len(tasks))]
+
+
+def _client(address: str, patience_s: float) -> Client:
+    try:
+        from distributed import Client
+    except ModuleNotFoundError as error:
+        expected = "Dask on this machine: pip install 'graben[cluster]'"
+        raise BadInput(Fault("--cluster", "", address, f"{expected} ({error})")) from None
+    try:
+        return Client(address, timeout=patience_s)
+    except (OSError, ValueError) as error:
+        expected = f'the address of a Dask scheduler, such as "tcp://10.0.0.1:8786" ({error})'
+        raise BadInput(Fault("--cluster", "", address, expected)) from None
+
+
+def _await_worker(client: Client, address: str, patience_s: float) -> None:
+    try:
+        client.wait_for_workers(1, timeout=patience_s)
+    except (TimeoutError, OSError):
+        raise BadInput(
+            Fault("--cluster", "", address, f"a cluster with workers (none for {patience_s:g} s)")
+        ) from None
