@@ -14,8 +14,8 @@ ALLOWED = {
     "schemas": {"schemas"},
     "mechanics": {"mechanics"},
 }
-# What mechanics may use beside itself and the standard library.
-MECHANICS_LIBRARIES = {"numpy", "scipy", "numba", "pyamg", "llvmlite"}
+# What mechanics may use beside itself and the standard library (cmaes is optional, imported where it is used).
+MECHANICS_LIBRARIES = {"numpy", "scipy", "numba", "pyamg", "llvmlite", "cmaes"}
 STRANGERS = {"blocks", "particles", "averaging", "wear"}
 
 

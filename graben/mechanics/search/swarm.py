@@ -74,8 +74,7 @@ def swarm(
         given = np.clip(np.atleast_2d(starts), 0.0, 1.0)[:particles]
         x[: len(given)] = given
     v = 0.5 * (stratified(rng, particles, size) - x)
-    values = np.asarray(function(x), float)
-    _check(values, particles)
+    values = finite_values(function(x), particles)
     own, own_values = x.copy(), values.copy()
     best = int(np.argmin(own_values))
     history = [own_values[best]]
@@ -87,8 +86,7 @@ def swarm(
         outside = (x < 0.0) | (x > 1.0)
         v[outside] *= -0.5
         x = np.clip(x, 0.0, 1.0)
-        values = np.asarray(function(x), float)
-        _check(values, particles)
+        values = finite_values(function(x), particles)
         better = values < own_values
         own[better], own_values[better] = x[better], values[better]
         best = int(np.argmin(own_values))
@@ -102,6 +100,9 @@ def swarm(
     )
 
 
-def _check(values: Array, particles: int) -> None:
-    if values.shape != (particles,) or not np.isfinite(values).all():
-        raise ValueError(f"swarm: the function must give {particles} finite values")
+def finite_values(values: Array, count: int) -> Array:
+    """What an objective gave for `count` points, as float64; ValueError unless that many and all finite."""
+    values = np.asarray(values, float)
+    if values.shape != (count,) or not np.isfinite(values).all():
+        raise ValueError(f"search: the function must give {count} finite values")
+    return values
