@@ -37,9 +37,10 @@ from graben.mechanics.materials.elastic import ELASTIC, update_elastic
 from graben.mechanics.materials.erve import ERVE, update_erve
 from graben.mechanics.materials.j2 import J2, update_j2
 from graben.mechanics.materials.law import UNKNOWN_LAW, Law
+from graben.mechanics.materials.lubliner import LUBLINER, prepare_lubliner, update_lubliner
 from graben.mechanics.materials.mohr_coulomb import MOHR_COULOMB, update_mohr_coulomb
 
-_RECORDS: tuple[Law, ...] = (ELASTIC, J2, MOHR_COULOMB, DRUCKER_PRAGER, ERVE)
+_RECORDS: tuple[Law, ...] = (ELASTIC, J2, MOHR_COULOMB, DRUCKER_PRAGER, LUBLINER, ERVE)
 
 LAWS: dict[str, Law] = {record.name: record for record in _RECORDS}
 
@@ -53,6 +54,8 @@ def update(law_id, deps, sig, state, par, length, tangent):
         return update_j2(deps, sig, state, par, length, tangent)
     if law_id == 2:
         return update_mohr_coulomb(deps, sig, state, par, length, tangent)
+    if law_id == 4:
+        return update_lubliner(deps, sig, state, par, length, tangent)
     if law_id == 5:
         return update_erve(deps, sig, state, par, length, tangent)
     if law_id == 0:
@@ -65,6 +68,8 @@ def prepare(law_id, par):
     """Fill the derived slots of par after its parameters changed (a search changes them in compiled code)."""
     if law_id == 3:
         prepare_drucker_prager(par)
+    elif law_id == 4:
+        prepare_lubliner(par)
 
 
 def find(name: str) -> Law:

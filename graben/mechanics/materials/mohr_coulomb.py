@@ -1,14 +1,16 @@
-"""Mohr-Coulomb plasticity with a tension cut-off: perfectly plastic, non-associated in shear, associated in tension.
+"""Mohr-Coulomb plasticity with a tension cut-off: perfectly plastic, non-associated in shear, associated in
+tension.
 
 With principal values s1 >= s2 >= s3 (tension positive), the surface is made of planes
 
     shear     s_i (1 + sin phi) - s_j (1 - sin phi) - 2 c cos phi = 0,   (i, j) = (1, 3), (2, 3), (1, 2)
     tension   s_i - T = 0,                                               i = 1, 2, 3
 
-and the flow of a shear plane has the dilation angle psi in place of phi. Between planes the stress returns to an edge or a
-corner with one multiplier per plane (Koiter). All planes are linear, so each choice of active planes is one small
-linear system; the return is the first choice, from few planes to many, whose multipliers are not negative and whose
-stress lies inside all other planes. The equivalent plastic strain sums sqrt(2/3 de_p : de_p).
+and the flow of a shear plane has the dilation angle psi in place of phi. Between planes the stress returns to
+an edge or a corner with one multiplier per plane (Koiter). All planes are linear, so each choice of active
+planes is one small linear system; the return is the first choice, from few planes to many, whose multipliers
+are not negative and whose stress lies inside all other planes. The equivalent plastic strain sums sqrt(2/3
+de_p : de_p).
 """
 
 from __future__ import annotations
@@ -104,7 +106,8 @@ def _solve3(a, b, m):
 
 @kernel(error_model="numpy")
 def _return(trial, bulk, shear, par, out, tangent):
-    """Sorted trial values -> out (3,) and tangent[:3, :3]; the plastic strain gained, or -1 without a return."""
+    """Sorted trial values -> out (3,) and tangent[:3, :3]; the plastic strain gained, or -1 without a
+    return."""
     sine, flow = math.sin(par[_PHI]), math.sin(par[_PSI])
     term = 2.0 * par[_C] * math.cos(par[_PHI])
     tension = _cut_off(par)

@@ -59,62 +59,47 @@ class Weights:
     penalty: float = 2.0
 
 
-@kernel(error_model="numpy")
-def _one(
-    law_id, base, slots, values, start_state, length, tolerance, parts, seat_parts, seats, controls, targets,
-    rows,
+@kernel(error_model="numpy", nogil=True)
+def _batch(
+    law_id, base, slots, values, start_state, length, tolerance, parts, seat_parts, seats, controls, targets, rows,
     zero, stress, strain, reached,
 ):  # fmt: skip
-    """Responses of one candidate to every curve."""
-    par = base.copy()
-    for i in range(slots.shape[0]):
-        par[slots[i]] = values[i]
-    prepare(law_id, par)
-    n = targets.shape[2]
+    """Responses of every candidate to every curve. One function: each layer of calls would compile the laws again."""
+    curves, n = targets.shape[0], targets.shape[2]
+    par, state = base.copy(), start_state.copy()
+    sig, eps = np.empty(n), np.empty(n)
     nothing = np.empty((0, start_state.shape[0]))
     ramp = np.zeros((2, n))
     seat_stress, seat_strain = np.empty((2, n)), np.empty((2, n))
-    for c in range(targets.shape[0]):
-        sig, eps = np.zeros(n), np.zeros(n)
-        state = start_state.copy()
-        for i in range(n):
-            ramp[1, i] = zero[c, i] if seats[c, i] == 1 else 0.0
-        done = drive(
-            law_id, par, length, tolerance, seat_parts, seats[c], ramp, sig, state, eps, seat_stress,
-            seat_strain,
-            nothing,
-        )  # fmt: skip
-        for i in range(n):
-            eps[i] = targets[c, 0, i] if controls[c, i] == 0 else 0.0
-        r = rows[c]
-        if done < 1.0:
-            # not even the first state can be reached: everything is missing
-            for row in range(r):
-                for i in range(n):
-                    stress[c, row, i] = sig[i]
-                    strain[c, row, i] = eps[i]
-            reached[c] = done - 1.0
-            continue
-        reached[c] = drive(
-            law_id, par, length, tolerance, parts, controls[c], targets[c, :r], sig, state, eps, stress[c,
-            :r],
-            strain[c, :r], nothing,
-        )  # fmt: skip
-
-
-@kernel(error_model="numpy", nogil=True)
-def _batch(
-    law_id, base, slots, values, start_state, length, tolerance, parts, seat_parts, seats, controls, targets,
-    rows,
-    zero, stress, strain, reached,
-):  # fmt: skip
-    """Responses of all candidates, one after the other."""
     for k in range(values.shape[0]):
-        _one(
-            law_id, base, slots, values[k], start_state, length, tolerance, parts, seat_parts, seats,
-            controls,
-            targets, rows, zero, stress[k], strain[k], reached[k],
-        )  # fmt: skip
+        for i in range(slots.shape[0]):
+            par[slots[i]] = values[k, i]
+        prepare(law_id, par)
+        for c in range(curves):
+            state[:] = start_state
+            sig[:] = 0.0
+            eps[:] = 0.0
+            for i in range(n):
+                ramp[1, i] = zero[c, i] if seats[c, i] == 1 else 0.0
+            done = drive(
+                law_id, par, length, tolerance, seat_parts, seats[c], ramp, sig, state, eps, seat_stress, seat_strain,
+                nothing,
+            )  # fmt: skip
+            for i in range(n):
+                eps[i] = targets[c, 0, i] if controls[c, i] == 0 else 0.0
+            r = rows[c]
+            if done < 1.0:
+                # not even the first state can be reached: everything is missing
+                for row in range(r):
+                    for i in range(n):
+                        stress[k, c, row, i] = sig[i]
+                        strain[k, c, row, i] = eps[i]
+                reached[k, c] = done - 1.0
+                continue
+            reached[k, c] = drive(
+                law_id, par, length, tolerance, parts, controls[c], targets[c, :r], sig, state, eps,
+                stress[k, c, :r], strain[k, c, :r], nothing,
+            )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -224,6 +209,11 @@ class CurveFit:
             raise ValueError("curves: compared components must be finite")
         self.groups = np.concatenate([*groups, group + np.arange(count)]).astype(np.int64)
         self._seats, self._controls = np.ascontiguousarray(flags[0]), np.ascontiguousarray(flags[1])
+
+    @property
+    def points(self) -> int:
+        """Number of compared points of all curves."""
+        return len(self._goal)
 
     def predict(self, values: Array) -> Predictions:
         """Responses of candidates `values` (c, k), parameter values in SI in the order of `free`."""

@@ -5,7 +5,8 @@ is s^2 (J^T J)^-1, s^2 = r.r / (m - k). Two things are added to it.
 
 The bounds: a parameter that the data do not see would get an error beyond its own range, and spoil those that
 it is correlated with. So the bounds enter as the precision 12 I of a uniform distribution over each range:
-covariance (J^T J / s^2 + 12 I)^-1. Where the data see much, nothing changes.
+covariance (J^T J / s^2 + 12 I)^-1. Where the data see much, nothing changes. A Gaussian prior adds its inverse
+variance there.
 
 Correlation: residuals along one curve are not independent (a slip event moves many points at once). The
 robust errors let residuals within a curve be correlated in any way up to a lag (Newey-West weights): they are
@@ -34,7 +35,7 @@ class Identifiability:
 
     free (k,) false where a bound holds the parameter (it is left out of the rest);
     standard_error, covariance, correlation: (k,), (k, k), (k, k), nan where not free; robust_error (k,): with
-    correlated residuals; identifiable (k,): free, and the data at least halve what the bounds leave open;
+    correlated residuals; identifiable (k,): free, and the data at least halve what the bounds (and the prior) leave open;
     direction_error (j,), directions (j, k): of the combinations, worst seen first, inf where flat; unseen (j,).
     """
 
@@ -58,13 +59,15 @@ def identify(
     lag: int = 0,
     edge: float = 1e-6,
     bounded: bool = True,
+    precision: Array | None = None,
 ) -> Identifiability:
     """Analyse an optimum x (k,) with residuals (m,) and jacobian (m, k), both from the unit box.
 
     groups (m,) numbers the curve and quantity a residual belongs to, in order along it; residuals of one
     group are taken as correlated up to `lag` points apart. edge: nearer to a bound than this counts as held
     by it. bounded: the bounds count as knowledge (without, a direction that the data do not see makes the
-    covariance singular).
+    covariance singular). precision (k,): inverse variances of Gaussian priors; residuals and jacobian are those of
+    the data alone.
     """
     k = x.size
     if jacobian.shape != (residuals.size, k):
@@ -83,7 +86,10 @@ def identify(
     freedom = max(1, residuals.size - index.size)
     # a perfect fit leaves no scatter to judge by; rounding is then the scatter
     s2 = max(float(residuals @ residuals) / freedom, 1e-30)
-    prior = np.eye(index.size) / UNSEEN**2 if bounded else np.zeros((index.size, index.size))
+    known_before = np.full(index.size, UNSEEN**-2.0 if bounded else 0.0)
+    if precision is not None:
+        known_before += precision[index]
+    prior = np.diag(known_before)
     inverse = np.linalg.inv(j.T @ j / s2 + prior)
     meat = _meat(j, residuals, groups, lag) * (residuals.size / freedom) / s2**2 + prior
     robust = inverse @ meat @ inverse
@@ -93,7 +99,7 @@ def identify(
     error[index] = deviation
     # neither estimate may claim less than the other by chance: a few slips can make the sandwich too small
     robust_error[index] = np.maximum(np.sqrt(np.maximum(np.diag(robust), 0.0)), deviation)
-    known[index] = robust_error[index] < 0.5 * UNSEEN
+    known[index] = robust_error[index] < 0.5 / np.sqrt(np.maximum(known_before, UNSEEN**-2.0))
     _u, values, vt = np.linalg.svd(j, full_matrices=False)
     seen = values > 1e-10 * max(values.max(), 1e-300)
     spread = np.where(seen, np.sqrt(s2) / np.maximum(values, 1e-300), np.inf)

@@ -1,0 +1,176 @@
+"""Quasi-brittle damage-plasticity: curves in uniaxial tests, strength ratios, recovery, limits, tangent."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import lambertw
+
+from graben.mechanics.materials.laws import LAWS, pack, update
+from graben.mechanics.materials.lubliner_curves import (
+    compression_rate,
+    cracking_strain,
+    inelastic_strain,
+    lambert_w,
+    tension_rate,
+)
+from graben.mechanics.materials.point import follow
+
+LAW = LAWS["lubliner"]
+NONE = np.zeros((0, 0))
+ROCK = {
+    "young_modulus": 20e9,
+    "poisson_ratio": 0.2,
+    "dilation_angle": math.radians(20),
+    "initial_yield": 10e6,
+    "peak_yield": 30e6,
+    "strain_at_peak": 0.002,
+    "tensile_yield": 3e6,
+    "tensile_decay": 2000.0,
+    "compressive_damage": 0.6,
+    "tensile_damage": 0.6,
+    "largest_inelastic_strain": 0.02,
+    "largest_cracking_strain": 0.01,
+}
+PAR = pack("lubliner", ROCK)
+
+
+def uniaxial(strains):
+    """Axial strain prescribed, lateral stresses zero."""
+    path = np.zeros((len(strains), 4))
+    path[:, 1] = strains
+    r = follow("lubliner", PAR, "sese", path)
+    assert r.complete.all()
+    return r
+
+
+def test_lambert_w_matches_scipy():
+    x = np.geomspace(1e-8, 1e8, 50)
+    np.testing.assert_allclose([lambert_w(v) for v in x], lambertw(x).real, rtol=1e-13)
+
+
+def test_damage_rates_lie_at_their_limits_and_conversions_invert():
+    """At d = 1 plastic strain stops growing with damage somewhere in the range, Y (2.83)-(2.84); not below."""
+    for d, steady in ((0.9, True), (1.1, False)):
+        m, n = compression_rate(d, 20e9, 10e6, 0.02), tension_rate(d, 20e9, 3e6, 0.01)
+        x = np.linspace(0, 0.02, 4001)
+        plastic = x - m * x / (1 - m * x) * 10e6 / 20e9
+        assert (np.diff(plastic) > 0).all() == steady
+        y = np.linspace(0, 0.01, 4001)
+        cracks = y - ((1 + y) ** n - 1) * 3e6 / 20e9
+        assert (np.diff(cracks) > 0).all() == steady
+        if steady:
+            np.testing.assert_allclose(
+                [inelastic_strain(p, m, 5e-4, 0.02) for p in plastic[::400]], x[::400], atol=1e-14
+            )
+            np.testing.assert_allclose(
+                [cracking_strain(p, n, 1.5e-4, 0.01) for p in cracks[::400]], y[::400], atol=1e-14
+            )
+
+
+def test_uniaxial_compression_follows_the_barcelona_curve():
+    r = uniaxial(-np.linspace(0, 0.006, 121))
+    alpha = (2 * 30 - 10 + 2 * math.sqrt(30 * 20)) / 10
+    beta = math.log(2 * alpha / (1 + alpha)) / 0.002
+    m = compression_rate(0.6, 20e9, 10e6, 0.02)
+    for stress, state in zip(r.stress[0], r.state[0]):
+        if state[2] < 1e-9:
+            continue
+        x = inelastic_strain(state[2], m, 5e-4, 0.02)
+        curve = 10e6 * ((1 + alpha) * math.exp(-beta * x) - alpha * math.exp(-2 * beta * x))
+        assert -stress[1] == pytest.approx(curve, rel=1e-8)
+        assert state[4] == pytest.approx(m * x, rel=1e-9) and state[3] < 1e-12
+    assert -r.stress[0, :, 1].min() == pytest.approx(30e6, rel=1e-3)
+
+
+def test_uniaxial_tension_follows_its_decay():
+    r = uniaxial(np.linspace(0, 0.002, 81))
+    n = tension_rate(0.6, 20e9, 3e6, 0.01)
+    for stress, state in zip(r.stress[0], r.state[0]):
+        if state[3] < 1e-9:
+            continue
+        x = cracking_strain(state[3], n, 1.5e-4, 0.01)
+        assert stress[1] == pytest.approx(3e6 * math.exp(-2000 * x), rel=1e-7)
+        assert state[5] == pytest.approx(1 - (1 + x) ** -n, rel=1e-7) and state[2] < 1e-12
+
+
+def test_biaxial_compression_yields_at_f0_times_the_uniaxial_stress():
+    for scale, yields in ((1 - 1e-6, False), (1 + 1e-6, True)):
+        stress = 1.16 * 10e6 * scale
+        sig, state = np.array([-stress, -stress, 0.0, 0.0]), LAW.initial_state(PAR)
+        assert update(LAW.id, np.zeros(4), sig, state, PAR, 1.0, NONE) == 0
+        assert (state[0] > 0) == yields
+
+
+def test_cracks_that_close_carry_compression_again():
+    """With w_c = 1 the modulus under compression is E (1 - Dc) whatever the tensile damage; in tension E (1 - D)."""
+    r = uniaxial(np.concatenate([np.linspace(0, 1e-3, 41), np.linspace(1e-3, -2e-4, 121)[1:]]))
+    strain, stress, state = r.strain[0, :, 1], r.stress[0, :, 1], r.state[0]
+    assert state[-1, 5] > 0.15
+    pulling = slice(40, 43)
+    slope = np.diff(stress[pulling]) / np.diff(strain[pulling])
+    np.testing.assert_allclose(slope, 20e9 * (1 - state[42, 5]), rtol=1e-6)
+    closing = (stress < -1e5) & (state[:, 4] < 1e-9)  # before it crushes
+    assert closing.sum() > 10
+    slope = np.diff(stress[closing]) / np.diff(strain[closing])
+    np.testing.assert_allclose(slope, 20e9, rtol=1e-6)
+
+
+def test_tangent_matches_finite_differences():
+    rng = np.random.default_rng(0)
+    errors = []
+    for trial in range(150):
+        n = 4 if trial % 2 else 6
+        sig, state, tangent = np.zeros(n), LAW.initial_state(PAR), np.zeros((n, n))
+        sig[:3] = -5e6
+        for _ in range(3):
+            deps = rng.normal(size=n) * 10 ** rng.uniform(-4.5, -3)
+            deps[:3] += (0.0, 2e-4, -4e-4)[trial % 3]
+            old, before = sig.copy(), state.copy()
+            assert update(LAW.id, deps, sig, state, PAR, 1.0, tangent) == 0
+            h = 1e-6 * np.abs(deps).max()
+            numeric = np.zeros((n, n))
+            for j in range(n):
+                ends = []
+                for way in (1, -1):
+                    s, z, d = old.copy(), before.copy(), deps.copy()
+                    d[j] += way * h
+                    update(LAW.id, d, s, z, PAR, 1.0, NONE)
+                    ends.append(s)
+                numeric[:, j] = (ends[0] - ends[1]) / (2 * h)
+            errors.append(np.abs(numeric - tangent).max() / 20e9)
+    assert np.median(errors) < 1e-6 and np.percentile(errors, 95) < 1e-3
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(
+    young=st.floats(4, 15),
+    nu=st.sampled_from([0.0, 0.2, 0.4999]),
+    psi=st.sampled_from([0.1, 5.0, 40.0, 70.0]),
+    kc=st.sampled_from([0.51, 2 / 3, 1.0]),
+    strength=st.sampled_from([1e-6, 1e-4, 1e-2]),
+    tension=st.sampled_from([1e-4, 0.1, 1.0]),
+    damage=st.sampled_from([0.0, 0.5, 0.95]),
+    seed=st.integers(0, 10_000),
+)
+def test_every_finite_increment_converges(young, nu, psi, kc, strength, tension, damage, seed):
+    """Over 11 decades of modulus and with reversals: no failure, damage only grows in each direction, all finite."""
+    e = 10.0**young
+    values = {"young_modulus": e, "poisson_ratio": nu, "dilation_angle": math.radians(psi)}
+    values |= {"stress_invariant_ratio": kc, "initial_yield": strength * e, "peak_yield": 2 * strength * e}
+    values |= {"strain_at_peak": 2 * strength, "tensile_yield": tension * strength * e, "tensile_decay": 500.0}
+    values |= {"compressive_damage": damage, "tensile_damage": damage, "max_damage": 0.999}
+    par = pack("lubliner", values)
+    rng = np.random.default_rng(seed)
+    n = 4 if seed % 2 else 6
+    sig, state, tangent = np.zeros(n), LAW.initial_state(par), np.zeros((n, n))
+    for step in range(6):
+        deps = rng.normal(size=n) * 10 ** rng.uniform(-8, -1)
+        if step % 3 == 2:
+            deps = -deps
+        before = state.copy()
+        assert update(LAW.id, deps, sig, state, par, 1.0, tangent) == 0
+        assert np.isfinite(sig).all() and np.isfinite(tangent).all() and np.isfinite(state).all()
+        assert (state[2:] >= before[2:]).all() and state[1] <= 0.999
