@@ -19,6 +19,8 @@ _CHAMFER_SHARE = 0.3
 class Bodies:
     """Blocks with grid points, zones and outlines; all arrays C-contiguous.
 
+    Vertices, zones and edges lie block by block in memory, blocks along a curve that keeps neighbours close (see
+    `along_curve`); the numbers of the blocks are those of the tessellation.
     position : (vertices, 2) [m], each block owns its vertices; vertex_block : (vertices,)
     block_start : (blocks + 1,), block_corner : vertex of each corner, counter-clockwise
     block_area : (blocks,) [m2]
@@ -48,9 +50,11 @@ def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> 
     A refined block is split evenly (each triangle into k x k), so its zones fit; blocks need not match.
     """
     points, start, corner = tessellation.points, tessellation.start, tessellation.corner
-    position, zones, edges, corners, owner = [], [], [], [], []
+    position, zones, edges = [], [], []
+    corners: list = [None] * tessellation.size
+    owner: list = []
     offset = 0
-    for b in range(tessellation.size):
+    for b in along_curve(_centres(tessellation)):
         ring = points[corner[start[b] : start[b + 1]]]
         triangles = ear_clip(ring)
         k = 1
@@ -61,12 +65,12 @@ def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> 
         position.append(xy)
         zones.append(tri + offset)
         edges.append(np.column_stack([loop, np.roll(loop, -1)]) + offset)
-        corners.append(np.arange(len(ring)) + offset)
-        owner.append(len(xy))
+        corners[b] = np.arange(len(ring)) + offset
+        owner.append(np.full(len(xy), b))
         offset += len(xy)
     x = np.vstack(position)
     edge = np.vstack(edges)
-    block = np.repeat(np.arange(tessellation.size), owner)
+    block = np.concatenate(owner)
     tolerance = 1e-6 * float(np.ptp(tessellation.outline, axis=0).max())
     on_side = distance_to_sides(x, tessellation.outline) < tolerance
     both = on_side[edge[:, 0]] & on_side[edge[:, 1]]
@@ -80,7 +84,7 @@ def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> 
         vertex_block=block,
         block_start=start.astype(np.int64),
         block_corner=np.concatenate(corners),
-        block_area=np.bincount(zone_block, weights=zone_area),
+        block_area=np.bincount(zone_block, weights=zone_area, minlength=tessellation.size),
         zone_vertex=np.ascontiguousarray(zone_vertex),
         zone_block=zone_block,
         edge_from=np.ascontiguousarray(edge[:, 0]),
@@ -89,6 +93,28 @@ def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> 
         vertex_side=on_side,
         edge_side=edge_side,
     )
+
+
+def _centres(tessellation: Tessellation) -> np.ndarray:
+    start, corner = tessellation.start, tessellation.corner
+    return np.add.reduceat(tessellation.points[corner], start[:-1], axis=0) / np.diff(start)[:, None]
+
+
+def along_curve(points: np.ndarray) -> np.ndarray:
+    """Order of points (n, 2) along Hilbert's curve: what is close on the plane is mostly close in memory."""
+    low, span = points.min(axis=0), max(float(np.ptp(points, axis=0).max()), 1e-300)
+    x, y = (np.minimum((points - low) / span * 65536.0, 65535.0)).astype(np.int64).T
+    place = np.zeros(len(points), dtype=np.int64)
+    side = 32768
+    while side:
+        right, up = (x & side) > 0, (y & side) > 0
+        place = 4 * place + np.where(right, np.where(up, 2, 3), up)
+        # Each quarter holds the curve turned: mirrored in a diagonal at the bottom, kept at the top.
+        mirrored = right & ~up
+        x, y = np.where(mirrored, 65535 - x, x), np.where(mirrored, 65535 - y, y)
+        x, y = np.where(up, x, y), np.where(up, y, x)
+        side //= 2
+    return np.argsort(place, kind="stable")
 
 
 def ear_clip(ring: np.ndarray) -> np.ndarray:
@@ -190,7 +216,7 @@ def chamfered_skin(bodies: Bodies, rounding: float) -> Skin:
     n = len(bodies.edge_from)
     block = bodies.vertex_block[bodies.edge_from]
     # Outline edges come block by block, each block a closed loop in order.
-    loop_start = np.searchsorted(block, np.arange(len(bodies.block_area)))
+    loop_start = np.flatnonzero(np.append(True, block[1:] != block[:-1]))
     loop_end = np.append(loop_start[1:], n)
     previous = np.arange(n) - 1
     previous[loop_start] = loop_end - 1

@@ -47,7 +47,7 @@ class Pairs(NamedTuple):
 
     key, first, second : (n,); shear : (n, 2) stress at both ends [Pa] on the first edge;
     slip : (n, 2) net plastic sliding [m]; flag : (n, 2) STICK, SLIP, OPEN, BROKEN; live : (n,) 1 once touching;
-    intact : (n,) 1 while the joint of the first state holds.
+    intact : (n,) 1 while the joint of the first state holds; joint : (n,) set of joints.
     """
 
     key: np.ndarray
@@ -58,6 +58,7 @@ class Pairs(NamedTuple):
     flag: np.ndarray
     live: np.ndarray
     intact: np.ndarray
+    joint: np.ndarray
 
 
 # Columns of the node table: position, velocity, and of the edge that starts there unit tangent, length and rim
@@ -66,9 +67,12 @@ X, Y, VX, VY, TX, TY, LENGTH, RIM, COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8
 
 
 @kernel(error_model="numpy")
-def node_motion(x, v, first, second, weight, follow, node):
-    """Fill the node table (nodes, 8) from vertex positions x and velocities v (vertices, 2); RIM stays."""
-    for i in range(first.shape[0]):
+def node_motion(x, v, first, second, weight, follow, node, begin, end):
+    """Fill rows begin to end of the node table (nodes, 8) from positions x and velocities v (vertices, 2); RIM stays.
+
+    Rows begin and end with a block.
+    """
+    for i in range(begin, end):
         a = first[i]
         b = second[i]
         w = weight[i]
@@ -76,7 +80,7 @@ def node_motion(x, v, first, second, weight, follow, node):
         node[i, Y] = x[a, 1] + w * (x[b, 1] - x[a, 1])
         node[i, VX] = v[a, 0] + w * (v[b, 0] - v[a, 0])
         node[i, VY] = v[a, 1] + w * (v[b, 1] - v[a, 1])
-    for i in range(first.shape[0]):
+    for i in range(begin, end):
         j = follow[i]
         dx = node[j, X] - node[i, X]
         dy = node[j, Y] - node[i, Y]
@@ -88,9 +92,9 @@ def node_motion(x, v, first, second, weight, follow, node):
 
 
 @kernel(error_model="numpy")
-def scatter_nodes(fn, first, second, weight, force):
-    """Hand the forces on contact nodes back to the vertices that they blend."""
-    for i in range(first.shape[0]):
+def scatter_nodes(fn, first, second, weight, force, begin, end):
+    """Hand the forces on contact nodes, rows begin to end, back to the vertices that they blend."""
+    for i in range(begin, end):
         a = first[i]
         b = second[i]
         w = weight[i]
@@ -125,12 +129,14 @@ def forget(shear, flag, intact, c):
 
 
 @kernel(error_model="numpy")
-def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
+def contact_forces(active, begin, stop, pairs, follow, node, joint, deepest, dt, fn, node_end, far_of, far, sums):
     """Stress update and forces of the active candidates; returns the pair that overlaps too much, or -1.
 
-    active : (m,) indices into pairs; node : node table; fn : (nodes, 2) forces, added to [N/m]
+    active[begin:stop] : indices into pairs, all of one set of joints; node : node table
+    fn : (nodes, 2) forces, added to [N/m]; those on the second edge, if it lies at or beyond node_end, go to row
+    far_of[pair] of far (rows, 4) instead
     deepest : overlap above which a touching pair stops the run, and others are no contact [m]
-    sums : [friction work, largest overlap]; the work that dilation gives back is not friction
+    sums : [friction work, largest overlap], added to; the work that dilation gives back is not friction
     """
     # Taken out of the tuple once: inside the loop each look-up would count references.
     first, second, shears, slips = pairs.first, pairs.second, pairs.shear, pairs.slip
@@ -142,8 +148,8 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
     compliance = 1.0 / ks
     ksdt = ks * dt
     friction_work = 0.0
-    largest = 0.0
-    for m in range(active.shape[0]):
+    largest = sums[1]
+    for m in range(begin, stop):
         c = active[m]
         e = first[c]
         f = second[c]
@@ -274,10 +280,17 @@ def contact_forces(active, pairs, follow, node, joint, deepest, dt, fn, sums):
         fn[e, 1] += fey0
         fn[e2, 0] += fex1
         fn[e2, 1] += fey1
-        fn[f, 0] += ffx0
-        fn[f, 1] += ffy0
-        fn[f2, 0] += ffx1
-        fn[f2, 1] += ffy1
+        if f < node_end:
+            fn[f, 0] += ffx0
+            fn[f, 1] += ffy0
+            fn[f2, 0] += ffx1
+            fn[f2, 1] += ffy1
+        else:
+            row = far_of[c]
+            far[row, 0] = ffx0
+            far[row, 1] = ffy0
+            far[row, 2] = ffx1
+            far[row, 3] = ffy1
     sums[0] += friction_work
     sums[1] = largest
     return -1

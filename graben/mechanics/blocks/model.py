@@ -21,6 +21,7 @@ from graben.mechanics.blocks.joints import (
     contact_state,
     node_motion,
 )
+from graben.mechanics.blocks.parts import cut_into_parts
 from graben.mechanics.failure import NumericsFailed
 
 
@@ -48,6 +49,7 @@ class BlockModel:
     dt : time step [s]. Given, masses follow from stiffness so that this step is stable everywhere (density scaling,
     for slow loading); None: true masses, and dt from the estimate.
     gravity : (gx, gy) [m/s2], always with true masses.
+    threads : more than 1 shares the work out to numba's threads, with bitwise the same result.
     """
 
     def __init__(
@@ -63,6 +65,7 @@ class BlockModel:
         gravity: tuple[float, float] = (0.0, 0.0),
         damping: Damping | None = None,
         intact: bool = True,
+        threads: int = 1,
     ) -> None:
         for name, value in (("young", young), ("density", density), ("kn", joint.normal_stiffness)):
             if not value > 0.0:
@@ -71,8 +74,10 @@ class BlockModel:
             raise ValueError(f"poisson must lie between -1 and 0.5, found {poisson}")
         self.bodies = bodies
         self.joint = joint
+        self.joints: tuple[Joint, ...] = (joint,)
         self.damping = damping or Damping()
         self.skin: Skin = chamfered_skin(bodies, rounding)
+        self.parts = cut_into_parts(bodies, self.skin)
         nv, nn = len(bodies.position), len(self.skin.first)
         gradient, area = zones.shape_gradients(bodies.position, bodies.zone_vertex)
         lam, mu = zones.lame(young, poisson)
@@ -87,6 +92,9 @@ class BlockModel:
         else:
             self.dt = float(dt)
             mass = stiffness * dt**2 / (4.0 * SAFETY**2)
+        self._edge_material = np.zeros(nn, dtype=np.int64)
+        self._set_of = np.zeros((1, 1), dtype=np.int64)
+        self.threads = threads
         self.held = np.zeros((nv, 2), dtype=bool)
         self.weight = self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :]
         self.mass_ratio = mass / self.true_mass
@@ -102,6 +110,7 @@ class BlockModel:
             self.skin.follow,
             mass,
             np.empty((0, 2), dtype=np.int64),
+            np.zeros(len(self.parts.node), dtype=np.int64),
             np.zeros((nv, 2)),
             self.weight.copy(),
             np.zeros((nv, 2)),
@@ -119,13 +128,10 @@ class BlockModel:
             np.zeros((nv, 2)),
             np.zeros((nn, COLUMNS)),
             np.zeros((nn, 2)),
-            np.zeros((nn, 2)),
-            np.zeros((nn, 2)),
-            np.empty(0, dtype=np.int64),
-            np.zeros(1, dtype=np.int64),
             np.zeros(6),
             np.zeros(2),
             np.zeros(5),
+            **search.fresh_watch(search.no_pairs(), self.parts, np.zeros((nn, COLUMNS))),
         )
         x, k = bodies.position, self.skin
         point = x[k.first] + k.weight[:, None] * (x[k.second] - x[k.first])
@@ -159,7 +165,7 @@ class BlockModel:
     def rebuild(self, first: bool = False) -> None:
         """Find the candidate contacts anew; joints found at the `first` call are intact."""
         m, s, skin = self.motion, self.skeleton, self.skin
-        node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.node)
+        node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.node, 0, len(m.node))
         if not np.all(np.isfinite(m.node)):
             raise NumericsFailed("a position is not finite", step=self.steps_done, advice=_SLOWER)
         slid = float(np.abs(self.pairs.slip).max()) if len(self.pairs.slip) else 0.0
@@ -179,16 +185,10 @@ class BlockModel:
             self.pairs.key,
             self.pairs.live,
         )
-        self.pairs = search.carry_history(keys, len(s.first), self.pairs)
-        if first and self.joint.tension > 0.0:
+        self.pairs = search.carry_history(keys, len(s.first), self.pairs, self._edge_material, self._set_of)
+        if first and any(j.tension > 0.0 for j in self.joints):
             self._bond()
-        active = np.empty(len(keys), dtype=np.int64)
-        m.built[:] = m.node[:, :2]
-        m.chosen[:] = m.node[:, :2]
-        self.motion = m._replace(active=active)
-        self.motion.active_count[0] = search.choose_active(
-            self.pairs, s.follow, m.node, self.near, self.joint.dilation, active
-        )
+        self.motion = m._replace(**search.fresh_watch(self.pairs, self.parts, m.node, len(self.joints)))
         self.rebuilds += 1
 
     def _bond(self) -> None:
@@ -207,16 +207,19 @@ class BlockModel:
     def advance(self, steps: int) -> None:
         """Take `steps` time steps. Raises NumericsFailed when something runs away or blocks overlap too far."""
         left = steps
+        step = rx.advance_together if self.threads > 1 and len(self.parts.node) > 2 else rx.advance
         while left > 0:
-            status, done, where = rx.advance(
+            status, done, where = step(
                 left,
                 self.skeleton,
                 self.motion,
+                self.parts,
                 self.pairs,
-                self.joint,
+                self.joints,
                 self.dt,
                 self.reach,
                 self.near,
+                max(j.dilation for j in self.joints),
                 self.deepest,
                 self.damping.ratio,
                 0.5 / self.dt,
@@ -266,7 +269,9 @@ class BlockModel:
 
     def _list_held(self) -> None:
         if len(self.skeleton.still) != self.held.sum() or not self.held[tuple(self.skeleton.still.T)].all():
-            self.skeleton = self.skeleton._replace(still=np.argwhere(self.held))
+            still = np.argwhere(self.held)
+            start = np.searchsorted(still[:, 0], self.parts.vertex).astype(np.int64)
+            self.skeleton = self.skeleton._replace(still=still, still_start=start)
 
     def press(self, edges: np.ndarray, normal_stress: float, rising: bool = False) -> None:
         """Add a normal stress [Pa, tension positive] on outline edges (indices or mask), as steady or rising load.
@@ -303,7 +308,7 @@ class BlockModel:
     def contacts(self) -> tuple[np.ndarray, np.ndarray, float]:
         """Touching pairs: out (n, 11) and ints (n, 2) as in `joints.contact_state`, and the stored energy [J/m]."""
         s, m = self.skeleton, self.motion
-        node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.node)
+        node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.node, 0, len(m.node))
         n = len(self.pairs.key)
         out, ints = np.zeros((n, 11)), np.zeros((n, 2), dtype=np.int64)
         count, stored = contact_state(self.pairs, s.follow, m.node, self.joint, self.deepest, out, ints)

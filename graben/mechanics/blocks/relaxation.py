@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from graben.mechanics.blocks.joints import contact_forces, node_motion, scatter_nodes
-from graben.mechanics.blocks.search import choose_active
+from graben.mechanics.blocks.search import follow_blocks, look_again
 from graben.mechanics.blocks.zones import zone_forces
 from graben.mechanics.compiled import kernel
 
@@ -15,17 +16,22 @@ DONE, REBUILD, RUNAWAY, DEEP_OVERLAP = 0, 1, 2, 3
 
 # Places in Motion.tally
 KINETIC, DAMPED, LOAD_WORK, WALL_WORK, RATE_SEEN, DAMPED_SEEN = range(6)
-# Places in Motion.sums (kept by the contact kernel)
+# Places in Motion.sums
 FRICTION, LARGEST_OVERLAP = range(2)
 # Places in Motion.drive
 DAMPING, LOAD, LOAD_STEP, SPEED, SPEED_STEP = range(5)
+
+# Columns of what each part adds up (one cache line a part): friction work, largest overlap, kinetic energy, powers
+# of damping, loads and walls; and the pair that overlaps too far.
+_FRICTION, _OVERLAP, _KINETIC, _DAMPED, _LOAD, _WALL, _DEEP, _SUMS = 0, 1, 2, 3, 4, 5, 6, 8
 
 
 class Skeleton(NamedTuple):
     """What does not change while stepping: zones, contact nodes, masses, constraints and loads.
 
     triangles, gradient, area, lam, mu : zones; first, second, weight, follow : contact nodes
-    mass : (vertices,) [kg/m]; still : (k, 2) vertex and axis of prescribed velocities, wall : (vertices, 2) [m/s]
+    mass : (vertices,) [kg/m]; still : (k, 2) vertex and axis of prescribed velocities, wall : (vertices, 2) [m/s];
+    still_start : (parts + 1,) where those of each part begin
     steady, rising : (vertices, 2) forces [N/m]; the load is steady + drive[LOAD] * rising
     """
 
@@ -40,16 +46,25 @@ class Skeleton(NamedTuple):
     follow: np.ndarray
     mass: np.ndarray
     still: np.ndarray
+    still_start: np.ndarray
     wall: np.ndarray
     steady: np.ndarray
     rising: np.ndarray
 
 
 class Motion(NamedTuple):
-    """What changes: positions and velocities of vertices and of contact nodes, forces, running sums.
+    """What changes: positions and velocities of vertices and of contact nodes, forces, running sums, and the watch.
 
     x, v, zone_force, joint_force, reaction : (vertices, 2); node : node table (nodes, 8); fn : (nodes, 2)
-    built, chosen : (nodes, 2) node positions at the last search and at the last choice of active pairs
+    From start on, the watch: which candidates are awake, part by part, and when to look at each of them again.
+    start : (parts + 1,) first candidate of each part, that of its first edge; awake ones are listed in active, those of
+    part p and set of joints s from turn[p, s] to turn[p, s + 1]
+    kind : (n,) what a candidate was when last looked at; wake : (n,) path [m] of its two blocks at which to look again
+    far_start : (parts + 1,), far_of : (n,) row of `far` (rows, 4) through which a pair hands forces on to another part,
+    -1 within a part; post_start : (parts + 1,), post : (rows, 2) row and node of the forces handed to each part
+    path, gone : (blocks,) bounds on the path of a block's nodes up to the reference and up to now; reference,
+    built : (nodes, 2) positions then and at the search; farthest : (parts, 2) squares of distance since then and speed
+    due : (1,) steps until the next look at how far nodes went
     """
 
     x: np.ndarray
@@ -59,48 +74,47 @@ class Motion(NamedTuple):
     reaction: np.ndarray
     node: np.ndarray
     fn: np.ndarray
-    built: np.ndarray
-    chosen: np.ndarray
-    active: np.ndarray
-    active_count: np.ndarray
     tally: np.ndarray
     sums: np.ndarray
     drive: np.ndarray
+    start: np.ndarray
+    active: np.ndarray
+    turn: np.ndarray
+    kind: np.ndarray
+    wake: np.ndarray
+    far_start: np.ndarray
+    far_of: np.ndarray
+    far: np.ndarray
+    post_start: np.ndarray
+    post: np.ndarray
+    path: np.ndarray
+    gone: np.ndarray
+    reference: np.ndarray
+    built: np.ndarray
+    farthest: np.ndarray
+    due: np.ndarray
 
 
 @kernel(error_model="numpy")
-def _moved(node, since):
-    """Largest squared distance that a node moved."""
-    largest = 0.0
-    for i in range(node.shape[0]):
-        dx = node[i, 0] - since[i, 0]
-        dy = node[i, 1] - since[i, 1]
-        d = dx * dx + dy * dy
-        # Written so that a nan counts as far.
-        if not d <= largest:
-            largest = d
-    return largest
+def _move(p, s, m, parts, load, alpha, local, dt, speed, sums):
+    """New velocities and positions in part p; adds up kinetic energy, and the powers of damping, loads and walls.
 
-
-@kernel(error_model="numpy")
-def _move(x, v, mass, zone, joint, steady, rising, load, alpha, local, dt, still, wall, speed, reaction):
-    """New velocities and positions; returns kinetic energy, and the powers of damping, loads and walls.
-
-    still : (k, 2) vertex and axis of each prescribed velocity; they move freely in the first loop, which knows no
-    exceptions, and are put right after it.
+    Vertices of prescribed velocity move freely in the first loop, which knows no exceptions, and are put right after it.
     """
+    x, v, mass, zone, joint, reaction = m.x, m.v, s.mass, m.zone_force, m.joint_force, m.reaction
+    steady, rising, still, wall = s.steady, s.rising, s.still, s.wall
     slow = 1.0 - 0.5 * alpha * dt
     fast = 1.0 / (1.0 + 0.5 * alpha * dt)
     kinetic = 0.0
     damped = 0.0
     load_work = 0.0
     wall_work = 0.0
-    for k in range(still.shape[0]):
+    for k in range(s.still_start[p], s.still_start[p + 1]):
         i = still[k, 0]
         d = still[k, 1]
         # For now the old velocity is kept here.
         reaction[i, d] = v[i, d]
-    for i in range(x.shape[0]):
+    for i in range(parts.vertex[p], parts.vertex[p + 1]):
         push = dt / mass[i]
         half = 0.5 * mass[i]
         for d in range(2):
@@ -123,7 +137,7 @@ def _move(x, v, mass, zone, joint, steady, rising, load, alpha, local, dt, still
             kinetic += half * new * new
             v[i, d] = new
             x[i, d] += dt * new
-    for k in range(still.shape[0]):
+    for k in range(s.still_start[p], s.still_start[p + 1]):
         i = still[k, 0]
         d = still[k, 1]
         old = reaction[i, d]
@@ -145,95 +159,220 @@ def _move(x, v, mass, zone, joint, steady, rising, load, alpha, local, dt, still
         kinetic += 0.5 * mass[i] * (new * new - free * free)
         v[i, d] = new
         x[i, d] += dt * (new - free)
-    return kinetic, damped, load_work, wall_work
+    sums[p, _KINETIC] = kinetic
+    sums[p, _DAMPED] = damped
+    sums[p, _LOAD] = load_work
+    sums[p, _WALL] = wall_work
+
+
+@kernel(error_model="numpy")
+def _press(p, s, m, parts, pairs, joints, deepest, dt, sums):
+    """Contact forces of the pairs of part p."""
+    fn, far = m.fn, m.far
+    for i in range(parts.node[p], parts.node[p + 1]):
+        fn[i, 0] = 0.0
+        fn[i, 1] = 0.0
+    for r in range(m.far_start[p], m.far_start[p + 1]):
+        for d in range(4):
+            far[r, d] = 0.0
+    own = sums[p]
+    own[_FRICTION] = 0.0
+    own[_OVERLAP] = 0.0
+    own[_DEEP] = -1.0
+    for k in range(m.turn.shape[1] - 1):
+        bad = contact_forces(
+            m.active,
+            m.turn[p, k],
+            m.turn[p, k + 1],
+            pairs,
+            s.follow,
+            m.node,
+            joints[k],
+            deepest,
+            dt,
+            fn,
+            parts.node[p + 1],
+            m.far_of,
+            far,
+            own,
+        )
+        if bad >= 0:
+            own[_DEEP] = bad
+
+
+@kernel(error_model="numpy")
+def _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums):
+    """Everything else of a step in part p: forces on vertices, new velocities, positions and contact nodes."""
+    fn, far, post, follow = m.fn, m.far, m.post, s.follow
+    for k in range(m.post_start[p], m.post_start[p + 1]):
+        r = post[k, 0]
+        i = post[k, 1]
+        j = follow[i]
+        fn[i, 0] += far[r, 0]
+        fn[i, 1] += far[r, 1]
+        fn[j, 0] += far[r, 2]
+        fn[j, 1] += far[r, 3]
+    joint_force, zone_force = m.joint_force, m.zone_force
+    for i in range(parts.vertex[p], parts.vertex[p + 1]):
+        for d in range(2):
+            joint_force[i, d] = 0.0
+            zone_force[i, d] = 0.0
+    begin = parts.node[p]
+    end = parts.node[p + 1]
+    scatter_nodes(fn, s.first, s.second, s.weight, joint_force, begin, end)
+    zone_forces(m.x, s.triangles, s.gradient, s.area, s.lam, s.mu, zone_force, parts.zone[p], parts.zone[p + 1])
+    _move(p, s, m, parts, load, alpha, local, dt, speed, sums)
+    node_motion(m.x, m.v, s.first, s.second, s.weight, follow, m.node, begin, end)
+
+
+@kernel(error_model="numpy")
+def _begin(s, m):
+    """Node table of the present positions; a look at all of them is due if somebody moved them since."""
+    x, v, node = m.x, m.v, m.node
+    first, second, weight = s.first, s.second, s.weight
+    for i in range(node.shape[0]):
+        w = weight[i]
+        for d in range(2):
+            if node[i, d] != x[first[i], d] + w * (x[second[i], d] - x[first[i], d]):
+                m.due[0] = 0
+    node_motion(x, v, first, second, weight, s.follow, node, 0, node.shape[0])
+
+
+@kernel(error_model="numpy")
+def _gather(m, sums, damping_ratio, damping_limit, alpha, dt):
+    """Add up the parts, always in the same order; returns the kinetic energy."""
+    kinetic = 0.0
+    damped = 0.0
+    load_work = 0.0
+    wall_work = 0.0
+    largest = 0.0
+    for p in range(sums.shape[0]):
+        m.sums[FRICTION] += sums[p, _FRICTION]
+        largest = max(largest, sums[p, _OVERLAP])
+        kinetic += sums[p, _KINETIC]
+        damped += sums[p, _DAMPED]
+        load_work += sums[p, _LOAD]
+        wall_work += sums[p, _WALL]
+    m.sums[LARGEST_OVERLAP] = largest
+    t = m.tally
+    if damping_ratio >= 0.0:
+        keep = 0.98
+        t[RATE_SEEN] = keep * t[RATE_SEEN] + (1.0 - keep) * abs(kinetic - t[KINETIC])
+        t[DAMPED_SEEN] = keep * t[DAMPED_SEEN] + (1.0 - keep) * damped * dt
+        if t[DAMPED_SEEN] < damping_ratio * t[RATE_SEEN]:
+            m.drive[DAMPING] = min(alpha * 1.02, damping_limit)
+        else:
+            m.drive[DAMPING] = max(alpha / 1.02, 1e-6 * damping_limit)
+    t[KINETIC] = kinetic
+    t[DAMPED] += damped * dt
+    t[LOAD_WORK] += load_work * dt
+    t[WALL_WORK] += wall_work * dt
+    return kinetic
+
+
+@kernel(error_model="numpy")
+def _worst(column):
+    """Largest entry; a nan counts as largest."""
+    worst = column[0]
+    for p in range(column.shape[0]):
+        if not column[p] <= worst:
+            return column[p] if column[p] > worst else np.inf
+    return worst
+
+
+@kernel(error_model="numpy")
+def _deep(sums):
+    """The first pair of all parts that overlaps too far, or -1."""
+    for p in range(sums.shape[0]):
+        if sums[p, _DEEP] >= 0.0:
+            return int(sums[p, _DEEP])
+    return -1
+
+
+@kernel(error_model="numpy")
+def _next_look(m, near, dt):
+    """Steps to take before the next look: blocks may move by a quarter of `near` until then."""
+    most = np.sqrt(_worst(m.farthest[:, 1])) * dt
+    return int(min(16.0, max(2.0, 0.25 * near / (most + 1e-300))))
+
+
+@kernel(error_model="numpy")
+def _next_drive(m):
+    """Load, wall speed and damping of this step; loads and wall speeds rise evenly within a call."""
+    drive = m.drive
+    load, speed, alpha = drive[LOAD], drive[SPEED], drive[DAMPING]
+    drive[LOAD] = load + drive[LOAD_STEP]
+    drive[SPEED] = min(1.0, speed + drive[SPEED_STEP])
+    return load, speed, alpha
 
 
 @kernel(error_model="numpy")
 def advance(
-    steps, skeleton, motion, pairs, joint, dt, skin, near, deepest, damping_ratio, damping_limit, local, fastest
+    steps, s, m, parts, pairs, joints, dt, skin, near, dilation, deepest, damping_ratio, damping_limit, local, fastest
 ):
     """Up to `steps` steps of `dt` [s]. Returns (status, steps done, pair concerned).
 
-    skin, near : reach of the candidates and of the active ones [m]; deepest : overlap limit [m]
+    s, m, parts : Skeleton, Motion, Parts; joints : sets of joints; dilation : largest tangent among them
+    skin, near : reach of the candidates and of the awake ones [m]; deepest : overlap limit [m]
     damping_ratio : adaptive global damping holds its power at this ratio to the rate of kinetic energy; below 0
     the damping coefficient in motion.drive stays as it is; damping_limit : its upper bound [1/s]
     local : share of the unbalanced force taken off against the velocity
     fastest : kinetic energy that stops the run [J/m]
     """
-    s = skeleton
-    m = motion
-    x = m.x
-    v = m.v
-    rebuild_at = (0.5 * skin) ** 2
-    choose_at = (0.5 * near) ** 2
-    keep = 0.98
-    check = 0
+    count = parts.node.shape[0] - 1
+    sums = np.zeros((count, _SUMS))
+    _begin(s, m)
     for step in range(steps):
-        node_motion(x, v, s.first, s.second, s.weight, s.follow, m.node)
-        # How far nodes went is looked at every few steps; the speed cap makes that safe.
-        if check == 0:
-            far = _moved(m.node, m.chosen)
-            if not far < choose_at:
-                far = _moved(m.node, m.built)
-                if not far < rebuild_at:
-                    return REBUILD, step, -1
-                m.active_count[0] = choose_active(pairs, s.follow, m.node, near, joint.dilation, m.active)
-                m.chosen[:] = m.node[:, :2]
-            check = 4
-        check -= 1
-        m.fn[:] = 0.0
-        m.joint_force[:] = 0.0
-        m.zone_force[:] = 0.0
-        bad = contact_forces(
-            m.active[: m.active_count[0]],
-            pairs,
-            s.follow,
-            m.node,
-            joint,
-            deepest,
-            dt,
-            m.fn,
-            m.sums,
-        )
+        if m.due[0] <= 0:
+            for p in range(count):
+                follow_blocks(p, parts, m.node, near, m)
+            if not _worst(m.farthest[:, 0]) < (0.5 * skin) ** 2:
+                return REBUILD, step, -1
+            for p in range(count):
+                look_again(p, parts, pairs, s.follow, m.node, near, dilation, m)
+            m.due[0] = _next_look(m, near, dt)
+        m.due[0] -= 1
+        for p in range(count):
+            _press(p, s, m, parts, pairs, joints, deepest, dt, sums)
+        bad = _deep(sums)
         if bad >= 0:
+            m.sums[LARGEST_OVERLAP] = sums[:, _OVERLAP].max()
             return DEEP_OVERLAP, step, bad
-        scatter_nodes(m.fn, s.first, s.second, s.weight, m.joint_force)
-        zone_forces(x, s.triangles, s.gradient, s.area, s.lam, s.mu, m.zone_force)
-        # Loads and wall speeds rise evenly within a call.
-        load = m.drive[LOAD]
-        m.drive[LOAD] = load + m.drive[LOAD_STEP]
-        speed = m.drive[SPEED]
-        m.drive[SPEED] = min(1.0, speed + m.drive[SPEED_STEP])
-        alpha = m.drive[DAMPING]
-        kinetic, damped, load_work, wall_work = _move(
-            x,
-            v,
-            s.mass,
-            m.zone_force,
-            m.joint_force,
-            s.steady,
-            s.rising,
-            load,
-            alpha,
-            local,
-            dt,
-            s.still,
-            s.wall,
-            speed,
-            m.reaction,
-        )
-        if not kinetic < fastest:
+        load, speed, alpha = _next_drive(m)
+        for p in range(count):
+            _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums)
+        if not _gather(m, sums, damping_ratio, damping_limit, alpha, dt) < fastest:
             return RUNAWAY, step, -1
-        t = m.tally
-        if damping_ratio >= 0.0:
-            t[RATE_SEEN] = keep * t[RATE_SEEN] + (1.0 - keep) * abs(kinetic - t[KINETIC])
-            t[DAMPED_SEEN] = keep * t[DAMPED_SEEN] + (1.0 - keep) * damped * dt
-            if t[DAMPED_SEEN] < damping_ratio * t[RATE_SEEN]:
-                m.drive[DAMPING] = min(alpha * 1.02, damping_limit)
-            else:
-                m.drive[DAMPING] = max(alpha / 1.02, 1e-6 * damping_limit)
-        t[KINETIC] = kinetic
-        t[DAMPED] += damped * dt
-        t[LOAD_WORK] += load_work * dt
-        t[WALL_WORK] += wall_work * dt
+    return DONE, steps, -1
+
+
+@kernel(error_model="numpy", parallel=True)
+def advance_together(
+    steps, s, m, parts, pairs, joints, dt, skin, near, dilation, deepest, damping_ratio, damping_limit, local, fastest
+):
+    """`advance` with parts shared out to threads: the same result, bit for bit."""
+    count = parts.node.shape[0] - 1
+    sums = np.zeros((count, _SUMS))
+    _begin(s, m)
+    for step in range(steps):
+        if m.due[0] <= 0:
+            for p in numba.prange(count):
+                follow_blocks(p, parts, m.node, near, m)
+            if not _worst(m.farthest[:, 0]) < (0.5 * skin) ** 2:
+                return REBUILD, step, -1
+            for p in numba.prange(count):
+                look_again(p, parts, pairs, s.follow, m.node, near, dilation, m)
+            m.due[0] = _next_look(m, near, dt)
+        m.due[0] -= 1
+        for p in numba.prange(count):
+            _press(p, s, m, parts, pairs, joints, deepest, dt, sums)
+        bad = _deep(sums)
+        if bad >= 0:
+            m.sums[LARGEST_OVERLAP] = sums[:, _OVERLAP].max()
+            return DEEP_OVERLAP, step, bad
+        load, speed, alpha = _next_drive(m)
+        for p in numba.prange(count):
+            _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums)
+        if not _gather(m, sums, damping_ratio, damping_limit, alpha, dt) < fastest:
+            return RUNAWAY, step, -1
     return DONE, steps, -1

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from graben.mechanics.blocks.joints import FACING_NONE, LENGTH, OPEN, RIM, TX, TY, Pairs, X, Y, forget
+from graben.mechanics.blocks.joints import FACING_NONE, LENGTH, OPEN, RIM, TX, TY, VX, VY, Pairs, X, Y, forget
+from graben.mechanics.blocks.parts import Parts
 from graben.mechanics.compiled import kernel
 
 
@@ -100,20 +101,25 @@ def _middle_gap(node, follow, e, f):
 
 
 @kernel(error_model="numpy")
-def carry_history(keys, nodes, old):
-    """Candidate arrays for `keys`, with the history of those that were candidates before."""
+def carry_history(keys, nodes, old, edge_material, set_of):
+    """Candidate arrays for `keys`, with the history of those that were candidates before.
+
+    edge_material : (edges,), set_of : (materials, materials) set of joints between two materials.
+    """
     n = keys.shape[0]
-    first = np.empty(n, dtype=np.int64)
-    second = np.empty(n, dtype=np.int64)
+    first = np.empty(n, dtype=np.int32)
+    second = np.empty(n, dtype=np.int32)
     shear = np.zeros((n, 2))
     slip = np.zeros((n, 2))
-    flag = np.full((n, 2), OPEN, dtype=np.int64)
-    live = np.zeros(n, dtype=np.int64)
-    whole = np.zeros(n, dtype=np.int64)
+    flag = np.full((n, 2), OPEN, dtype=np.int8)
+    live = np.zeros(n, dtype=np.int8)
+    whole = np.zeros(n, dtype=np.int8)
+    joint = np.zeros(n, dtype=np.int16)
     m = 0
     for k in range(n):
         first[k] = keys[k] // nodes
         second[k] = keys[k] % nodes
+        joint[k] = set_of[edge_material[first[k]], edge_material[second[k]]]
         while m < old.key.shape[0] and old.key[m] < keys[k]:
             m += 1
         if m < old.key.shape[0] and old.key[m] == keys[k]:
@@ -123,76 +129,164 @@ def carry_history(keys, nodes, old):
                 flag[k, d] = old.flag[m, d]
             live[k] = old.live[m]
             whole[k] = old.intact[m]
-    return Pairs(keys, first, second, shear, slip, flag, live, whole)
+    return Pairs(keys, first, second, shear, slip, flag, live, whole, joint)
 
 
 def no_pairs() -> Pairs:
     """An empty set of candidates."""
-    i, f = np.empty(0, dtype=np.int64), np.empty((0, 2))
-    return Pairs(i, i.copy(), i.copy(), f, f.copy(), np.empty((0, 2), dtype=np.int64), i.copy(), i.copy())
+    i, mark, f = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int8), np.empty((0, 2))
+    flag = np.empty((0, 2), dtype=np.int8)
+    return Pairs(np.empty(0, dtype=np.int64), i, i.copy(), f, f.copy(), flag, mark, mark.copy(), np.empty(0, dtype=np.int16))
+
+
+def fresh_watch(pairs: Pairs, parts: Parts, node: np.ndarray, sets: int = 1) -> dict[str, np.ndarray]:
+    """The watch (fields of relaxation.Motion) over fresh candidates: all of them are due to be looked at."""
+    n, count = len(pairs.key), len(parts.node) - 1
+    start = np.searchsorted(pairs.first, parts.node).astype(np.int64)
+    home = np.repeat(np.arange(count), np.diff(start))
+    other = np.searchsorted(parts.node, pairs.second, side="right") - 1
+    across = np.flatnonzero(home != other)
+    far_of = np.full(n, -1, dtype=np.int32)
+    far_of[across] = np.arange(len(across))
+    order = np.argsort(other[across], kind="stable")
+    post = np.column_stack([order, pairs.second[across][order]]).astype(np.int64)
+    blocks = int(parts.block[-1])
+    return {
+        "start": start,
+        "active": np.zeros(n, dtype=np.int64),
+        "turn": np.zeros((count, sets + 1), dtype=np.int64),
+        "kind": np.full(n, AWAY, dtype=np.int8),
+        "wake": np.full(n, -1.0),
+        "far_start": np.searchsorted(across, start).astype(np.int64),
+        "far_of": far_of,
+        "far": np.zeros((len(across), 4)),
+        "post_start": np.searchsorted(other[across][order], np.arange(count + 1)).astype(np.int64),
+        "post": post,
+        "path": np.zeros(blocks),
+        "gone": np.zeros(blocks),
+        "reference": node[:, :2].copy(),
+        "built": node[:, :2].copy(),
+        "farthest": np.zeros((count, 2)),
+        "due": np.zeros(1, dtype=np.int64),
+    }
+
+
+# What a candidate is: closed, facing with a gap, beside each other, turned away, asleep.
+CLOSED, FACING, BESIDE, TURNED, AWAY = 0, 1, 2, 3, 4
 
 
 @kernel(error_model="numpy")
-def choose_active(pairs, follow, node, reach, dilation, active):
-    """Candidates that can touch before any node moves by reach / 2; the others sleep. Returns their number.
+def _look(pairs, c, follow, node, dilation):
+    """What candidate c is now, and how far [m] its blocks may move, taken together, before it can touch."""
+    e = pairs.first[c]
+    f = pairs.second[c]
+    facing = -(node[e, TX] * node[f, TX] + node[e, TY] * node[f, TY])
+    shortest = min(node[e, LENGTH], node[f, LENGTH])
+    # One edge turns by at most 2 / length times the motion of its ends.
+    room = 0.5 * (FACING_NONE - facing) * shortest
+    if facing <= -0.9:
+        return TURNED, room
+    scale = 1.0 / np.sqrt(2.0 + 2.0 * facing)
+    tx = (node[e, TX] - node[f, TX]) * scale
+    ty = (node[e, TY] - node[f, TY]) * scale
+    ox = node[e, X]
+    oy = node[e, Y]
+    f2 = follow[f]
+    se = node[e, LENGTH] * (node[e, TX] * tx + node[e, TY] * ty)
+    rise = node[e, LENGTH] * (node[e, TX] * ty - node[e, TY] * tx)
+    s0 = (node[f, X] - ox) * tx + (node[f, Y] - oy) * ty
+    s1 = (node[f2, X] - ox) * tx + (node[f2, Y] - oy) * ty
+    h0 = (node[f, X] - ox) * ty - (node[f, Y] - oy) * tx
+    h1 = (node[f2, X] - ox) * ty - (node[f2, Y] - oy) * tx
+    length = min(se, s0) - max(0.0, s1) - node[e, RIM] - node[f, RIM]
+    held = dilation * max(abs(pairs.slip[c, 0]), abs(pairs.slip[c, 1]))
+    # A turn of the tangent shifts ends by at most their distance times the turn.
+    far = 2.0 * (1.0 + (abs(h0) + abs(h1)) / shortest)
+    room = max(room, -length / far, (min(h0, h1) - max(0.0, rise) - held) / far)
+    if facing <= FACING_NONE:
+        return TURNED, room
+    if length <= 0.0:
+        return BESIDE, room
+    if pairs.flag[c, 0] >= OPEN and pairs.flag[c, 1] >= OPEN:
+        return FACING, room
+    return CLOSED, room
 
-    A pair sleeps when it is too far apart along its normal or along its tangent, or turned away; what it remembers
-    of shear is then wiped, as for any open contact. dilation : tangent; slid joints push before they overlap.
-    Active pairs come sorted by what they are now (closed, facing with a gap, beside each other, turned away), so that
-    branches of the contact kernel are taken in runs.
+
+@kernel(error_model="numpy")
+def follow_blocks(p, parts, node, near, watch):
+    """Add to the paths of the blocks of part p; note how far and how fast its nodes are."""
+    owner, path, gone, reference, built = parts.owner, watch.path, watch.gone, watch.reference, watch.built
+    farthest = 0.0
+    fastest = 0.0
+    i = parts.node[p]
+    end = parts.node[p + 1]
+    while i < end:
+        b = owner[i]
+        first = i
+        far = 0.0
+        while i < end and owner[i] == b:
+            dx = node[i, X] - built[i, 0]
+            dy = node[i, Y] - built[i, 1]
+            d = dx * dx + dy * dy
+            # Written so that a nan counts as far.
+            if not d <= farthest:
+                farthest = d
+            dx = node[i, X] - reference[i, 0]
+            dy = node[i, Y] - reference[i, 1]
+            far = max(far, dx * dx + dy * dy)
+            fastest = max(fastest, node[i, VX] * node[i, VX] + node[i, VY] * node[i, VY])
+            i += 1
+        far = np.sqrt(far)
+        if far > near:
+            path[b] += far
+            far = 0.0
+            for j in range(first, i):
+                reference[j, 0] = node[j, X]
+                reference[j, 1] = node[j, Y]
+        gone[b] = path[b] + far
+    watch.farthest[p, 0] = farthest
+    watch.farthest[p, 1] = fastest
+
+
+@kernel(error_model="numpy")
+def look_again(p, parts, pairs, follow, node, near, dilation, watch):
+    """Look at those candidates of part p whose blocks moved enough; wake them or put them to sleep.
+
+    A pair sleeps when it is too far apart along its normal or along its tangent, or turned away; what it remembers of
+    shear is then wiped, as for any open contact. dilation : largest tangent; slid joints push before they overlap.
+    Awake pairs come sorted by what they were, so that branches of the contact kernel are taken in runs.
     """
-    first, second, slips, flags = pairs.first, pairs.second, pairs.slip, pairs.flag
-    shears, live, intact = pairs.shear, pairs.live, pairs.intact
-    n = first.shape[0]
-    kind = np.empty(n, dtype=np.int64)
-    total = np.zeros(5, dtype=np.int64)
-    for c in range(n):
-        e = first[c]
-        f = second[c]
-        facing = -(node[e, TX] * node[f, TX] + node[e, TY] * node[f, TY])
-        slack = 2.0 * reach / min(node[e, LENGTH], node[f, LENGTH])
-        sort = 3
-        if facing <= FACING_NONE - slack:
-            sort = 4
-        elif facing > -0.9:
-            scale = 1.0 / np.sqrt(2.0 + 2.0 * facing)
-            tx = (node[e, TX] - node[f, TX]) * scale
-            ty = (node[e, TY] - node[f, TY]) * scale
-            ox = node[e, X]
-            oy = node[e, Y]
-            f2 = follow[f]
-            along = node[e, TX] * tx + node[e, TY] * ty
-            se = node[e, LENGTH] * along
-            rise = node[e, LENGTH] * (node[e, TX] * ty - node[e, TY] * tx)
-            s0 = (node[f, X] - ox) * tx + (node[f, Y] - oy) * ty
-            s1 = (node[f2, X] - ox) * tx + (node[f2, Y] - oy) * ty
-            h0 = (node[f, X] - ox) * ty - (node[f, Y] - oy) * tx
-            h1 = (node[f2, X] - ox) * ty - (node[f2, Y] - oy) * tx
-            length = min(se, s0) - max(0.0, s1) - node[e, RIM] - node[f, RIM]
-            held = dilation * max(abs(slips[c, 0]), abs(slips[c, 1]))
-            # A turn of the tangent shifts ends by at most their distance times the turn.
-            far = reach * (1.0 + (abs(h0) + abs(h1)) / min(node[e, LENGTH], node[f, LENGTH]))
-            if length < -2.0 * far or min(h0, h1) - max(0.0, rise) > 2.0 * far + held:
-                sort = 4
-            elif facing <= FACING_NONE:
-                sort = 3
-            elif length <= 0.0:
-                sort = 2
-            elif flags[c, 0] >= OPEN and flags[c, 1] >= OPEN:
-                sort = 1
-            else:
-                sort = 0
-        if sort == 4:
-            forget(shears, flags, intact, c)
-            live[c] = 0
-        kind[c] = sort
-        total[sort] += 1
-    place = np.zeros(5, dtype=np.int64)
-    for k in range(1, 5):
-        place[k] = place[k - 1] + total[k - 1]
-    for c in range(n):
-        k = kind[c]
-        if k < 4:
-            active[place[k]] = c
-            place[k] += 1
-    return n - total[4]
+    owner, gone, wake, kind = parts.owner, watch.gone, watch.wake, watch.kind
+    first, second = pairs.first, pairs.second
+    begin = watch.start[p]
+    end = watch.start[p + 1]
+    changed = False
+    for c in range(begin, end):
+        moved = gone[owner[first[c]]] + gone[owner[second[c]]]
+        if moved < wake[c]:
+            continue
+        now, room = _look(pairs, c, follow, node, dilation)
+        if room >= near:
+            wake[c] = moved + room - 0.5 * near
+            if kind[c] != AWAY or pairs.live[c] == 1:
+                forget(pairs.shear, pairs.flag, pairs.intact, c)
+                pairs.live[c] = 0
+            now = AWAY
+        else:
+            wake[c] = moved + near
+        if kind[c] != now:
+            kind[c] = now
+            changed = True
+    if not changed:
+        return
+    active, of_set, turn = watch.active, pairs.joint, watch.turn
+    sets = turn.shape[1] - 1
+    fill = begin
+    for s in range(sets):
+        turn[p, s] = fill
+        for k in range(AWAY):
+            for c in range(begin, end):
+                if kind[c] == k and (sets == 1 or of_set[c] == s):
+                    active[fill] = c
+                    fill += 1
+    turn[p, sets] = fill

@@ -46,9 +46,9 @@ def stiffness_row_sums(gradient: np.ndarray, area: np.ndarray, lam: np.ndarray, 
 
 
 @kernel(error_model="numpy")
-def zone_forces(x, triangles, gradient, area, lam, mu, force):
-    """Add the forces of the zones on their vertices to `force` (vertices, 2) [N/m]."""
-    for z in range(triangles.shape[0]):
+def zone_forces(x, triangles, gradient, area, lam, mu, force, begin, end):
+    """Add the forces of the zones, rows begin to end, on their vertices to `force` (vertices, 2) [N/m]."""
+    for z in range(begin, end):
         a = triangles[z, 0]
         b = triangles[z, 1]
         c = triangles[z, 2]

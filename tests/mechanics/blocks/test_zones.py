@@ -22,7 +22,7 @@ def mesh(request):
 def forces(mesh, x):
     bodies, gradient, area, lam, mu = mesh
     out = np.zeros_like(x)
-    zones.zone_forces(x, bodies.zone_vertex, gradient, area, lam, mu, out)
+    zones.zone_forces(x, bodies.zone_vertex, gradient, area, lam, mu, out, 0, len(area))
     return out
 
 
@@ -94,7 +94,7 @@ def test_row_sums_bound_the_fastest_mode(mesh):
                 x[bodies.zone_vertex[z, a], d] += h
                 one = np.zeros_like(x)
                 zones.zone_forces(
-                    x, bodies.zone_vertex[z : z + 1], gradient[z : z + 1], area[z : z + 1], lam, mu, one
+                    x, bodies.zone_vertex[z : z + 1], gradient[z : z + 1], area[z : z + 1], lam, mu, one, 0, 1
                 )
                 stiffness[:, 2 * bodies.zone_vertex[z, a] + d] -= one.ravel() / h
     seen = np.flatnonzero(np.abs(stiffness).sum(axis=1))
