@@ -5,8 +5,8 @@ is s^2 (J^T J)^-1, s^2 = r.r / (m - k). Two things are added to it.
 
 The bounds: a parameter that the data do not see would get an error beyond its own range, and spoil those that
 it is correlated with. So the bounds enter as the precision 12 I of a uniform distribution over each range:
-covariance (J^T J / s^2 + 12 I)^-1. Where the data see much, nothing changes. A Gaussian prior adds its inverse
-variance there.
+covariance (J^T J / s^2 + 12 I)^-1. Where the data see much, nothing changes. A Gaussian prior adds its
+inverse variance there.
 
 Correlation: residuals along one curve are not independent (a slip event moves many points at once). The
 robust errors let residuals within a curve be correlated in any way up to a lag (Newey-West weights): they are
@@ -33,10 +33,11 @@ UNSEEN = 12.0**-0.5  # standard deviation of a uniform distribution over the ran
 class Identifiability:
     """Linear uncertainty at an optimum; all in the unit box (fractions of each parameter's range).
 
-    free (k,) false where a bound holds the parameter (it is left out of the rest);
-    standard_error, covariance, correlation: (k,), (k, k), (k, k), nan where not free; robust_error (k,): with
-    correlated residuals; identifiable (k,): free, and the data at least halve what the bounds (and the prior) leave open;
-    direction_error (j,), directions (j, k): of the combinations, worst seen first, inf where flat; unseen (j,).
+    free (k,) false where a bound holds the parameter (it is left out of the rest); standard_error,
+    covariance, correlation: (k,), (k, k), (k, k), nan where not free; robust_error (k,): with correlated
+    residuals; identifiable (k,): free, and the data at least halve what the bounds (and the prior) leave
+    open; direction_error (j,), directions (j, k): of the combinations, worst seen first, inf where flat;
+    unseen (j,).
     """
 
     free: NDArray[np.bool_]
@@ -66,8 +67,8 @@ def identify(
     groups (m,) numbers the curve and quantity a residual belongs to, in order along it; residuals of one
     group are taken as correlated up to `lag` points apart. edge: nearer to a bound than this counts as held
     by it. bounded: the bounds count as knowledge (without, a direction that the data do not see makes the
-    covariance singular). precision (k,): inverse variances of Gaussian priors; residuals and jacobian are those of
-    the data alone.
+    covariance singular). precision (k,): inverse variances of Gaussian priors; residuals and jacobian are
+    those of the data alone.
     """
     k = x.size
     if jacobian.shape != (residuals.size, k):

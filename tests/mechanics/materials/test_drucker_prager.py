@@ -299,7 +299,9 @@ def test_every_finite_increment_converges_on_or_inside_the_surface(
         size = 2 * shear * np.abs(deps).max() + 3 * bulk * np.abs(deps[:3]).max() + np.abs(old).max() + curve
         assert surface(effective, ratio, tb) <= (1 - tb / 3) * curve + 1e-9 * size
         plastic = tensor(deps, 0.5) - elastic_strain(effective - old, e, nu)
-        assert np.sum(effective * plastic) >= -1e-9 * size * np.abs(deps).max()
+        # the plastic strain is a difference of elastic strains: their rounding times the stress is not dissipation
+        rounding = 1e-14 * size**2 / e
+        assert np.sum(effective * plastic) >= -1e-9 * size * np.abs(deps).max() - rounding
 
 
 def hardening_value(par, slot, values, strain):
