@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import click
@@ -18,6 +19,12 @@ from graben.cli.options import FILE, Session, Tool, cluster_option, set_option, 
     "--radius", "radii", multiple=True, metavar="LENGTH", help="Radius to try (repeatable; in rising order)."
 )
 @click.option("--grid", type=int, help="Centres per side of a square grid.")
+@click.option(
+    "--calibrate",
+    type=FILE,
+    metavar="SCENE",
+    help='Scene of kind "calibrate": fit its law to every sample; the parameters must settle.',
+)
 @click.option("--processes", type=int, help="Processes that share the work (0: one per core).")
 @cluster_option
 @set_option
@@ -28,6 +35,7 @@ def main(
     scene: Path | None,
     radii: tuple[str, ...],
     grid: int | None,
+    calibrate: Path | None,
     processes: int | None,
     cluster: str | None,
     overrides: tuple[str, ...],
@@ -36,7 +44,8 @@ def main(
 ) -> None:
     """Average runs of blocks over many radii and places, and recommend a radius.
 
-    Several inputs are realizations: the same model from other seeds, at the same lateral stress.
+    Several inputs are realizations: the same model from other seeds, at the same lateral stress. With
+    --calibrate each seed may come at several lateral stresses, which are fitted together.
     """
     from graben.schemas.scene import load_scene
     from graben.stages import rev_study
@@ -47,6 +56,8 @@ def main(
         short.append("samples.radii=[" + ", ".join(f'"{r}"' for r in radii) + "]")
     if grid is not None:
         short.append(f"samples.grid={grid}")
+    if calibrate is not None:
+        short.append(f"calibration.scene={json.dumps(str(calibrate.resolve()))}")
     if processes is not None:
         short.append(f"processes={processes}")
     study = load_scene(scene, "rev-study", short) if scene else default_scene("rev-study", short)

@@ -17,11 +17,13 @@ from graben.schemas.faults import BadInput, Fault
 
 @dataclass(frozen=True)
 class Run:
-    """One artifact of blocks: its file, its arrays, and its lateral stress (Pa, compression negative)."""
+    """One artifact of blocks: its file, its arrays, its lateral stress (Pa, compression negative), and its seed
+    (-1: not known)."""
 
     path: Path
     history: History
     confining_stress: float
+    seed: int = -1
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -84,7 +86,7 @@ def read_run(path: Path) -> Run:
         _ = history.network
     except ValueError as error:
         raise BadInput(Fault(str(path), "zone_vertex", "", f"blocks with closed outlines ({error})")) from error
-    return Run(path, history, float(data["confining_stress"]))
+    return Run(path, history, float(data["confining_stress"]), int(data.attrs.get("seed", -1)))
 
 
 def _floats(data: xarray.Dataset, name: str) -> np.ndarray:

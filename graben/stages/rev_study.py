@@ -23,9 +23,11 @@ from graben.schemas.artifact import write_artifact
 from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import refuse_existing
 from graben.schemas.layouts.rev_study import LAYOUT
+from graben.schemas.scene import load_scene
 from graben.schemas.scenes.rev_study import RevStudyScene
 from graben.stages.block_history import Run, read_run
 from graben.stages.record import Progress, Record, silent
+from graben.stages.rev_calibration import Fits, chosen_parameters, fit_samples
 from graben.stages.workers import compute
 
 RESAMPLES = {"draft": 500, "standard": 2000, "reference": 20_000}
@@ -63,11 +65,15 @@ def run(
     BadInput : faults of the inputs, a REV outside a model, runs at different lateral stress, an output that exists
     """
     refuse_existing(output, overwrite)
-    runs = _read(inputs, progress)
-    record = Record.begin(scene, inputs=inputs)
+    law = load_scene(scene.calibration.scene, "calibrate") if scene.calibration is not None else None
+    runs = _read(inputs, scene, progress)
+    groups = _realizations(runs)
+    record = Record.begin(scene, inputs=[*inputs, *([law.source.path] if law else [])])
+    processes = scene.processes or os.cpu_count() or 1
     centres = _centres(runs, scene)
     chunks = _chunks(runs, centres, scene)
-    samples = _sampled(chunks, scene.processes or os.cpu_count() or 1, cluster, progress)
+    end = 0.5 if law else 1.0
+    samples = _sampled(chunks, processes, cluster, lambda f, words: progress(end * f, words))
     arrays = _arrays(runs, centres, samples, scene)
     criteria = Criteria(
         scene.tests.confidence,
@@ -76,51 +82,92 @@ def run(
         scene.tests.resamples or RESAMPLES[scene.fidelity],
     )
     radii = np.asarray(scene.samples.radii)
-    independent = independent_samples(centres[0], radii, len(runs))
-    by_name = _statistics(arrays, criteria, scene)
-    missing = [name for name in scene.curves.properties if name not in by_name]
+    independent = independent_samples(centres[0], radii, len(groups))
+    by_name = _statistics(arrays, criteria, scene, independent) if groups.shape[1] == 1 else {}
+    for name, c in by_name.items():
+        arrays |= {f"{name}_{part}": values for part, values in _parts(c).items()}
+    chosen: Sequence[str] = scene.curves.properties
+    if law is not None:
+        middle = int(np.argmin(((centres[0] - centres[0].mean(axis=0)) ** 2).sum(axis=1)))
+        fits = fit_samples(
+            scene, law, arrays["stress"], arrays["strain"], groups, middle, processes, cluster,
+            lambda f, words: progress(0.5 + 0.5 * f, words),
+        )  # fmt: skip
+        chosen = chosen_parameters(scene, fits)
+        by_name = {
+            name: convergence(values, criteria, scene.seed + k, independent)
+            for k, (name, values) in enumerate(zip(fits.names, fits.value))
+        }
+        arrays |= _fit_arrays(runs, groups, fits, by_name)
+    missing = [name for name in chosen if name not in by_name]
     if missing:
         wanted = "a value in at least one sample of every radius (does the curve rise, and peak inside the run?)"
         raise BadInput(
             [Fault(", ".join(map(str, inputs)), f"curves.properties {name}", "none", wanted) for name in missing]
         )
-    advice = recommend(radii, {name: by_name[name] for name in scene.curves.properties}, independent)
-    for name, c in by_name.items():
-        arrays |= {
-            f"{name}_count": c.count,
-            f"{name}_mean": c.mean,
-            f"{name}_deviation": c.deviation,
-            f"{name}_low": c.low,
-            f"{name}_high": c.high,
-            f"{name}_mean_p": c.mean_p,
-            f"{name}_variance_p": c.variance_p,
-            f"{name}_settled": c.settled,
-        }
+    advice = recommend(radii, {name: by_name[name] for name in chosen}, independent)
     arrays["independent_samples"] = independent
     arrays["recommended_radius"] = advice.radius or 0.0
     record.cost |= {
         "samples": int(arrays["area"].size),
-        **({"cluster": cluster} if cluster else {"processes": scene.processes or os.cpu_count() or 1}),
+        **({"cluster": cluster} if cluster else {"processes": processes}),
     }
     attributes = {
         "reason": advice.reason,
-        "chosen_properties": ", ".join(scene.curves.properties),
+        "chosen_properties": ", ".join(chosen),
         "confidence": criteria.confidence,
         "tolerance": criteria.tolerance,
         "variation": criteria.variation,
-        "bootstrap_over": "runs" if len(runs) >= 3 else "samples",
+        "bootstrap_over": "runs" if len(groups) >= 3 else "samples",
     }
+    if law is not None:
+        attributes["law"] = law.law
     write_artifact(output, LAYOUT, arrays, record, attributes)
     return {
         "recommended_radius_m": advice.radius,
         "reason": advice.reason,
         "samples": int(arrays["area"].size),
-        "properties": [_row(name, c) for name, c in by_name.items()],
+        "realizations": len(groups),
+        "properties": [_row(name, c, "_si" if law else None) for name, c in by_name.items()],
     }
 
 
-def _row(name: str, c: Convergence) -> dict[str, Any]:
-    units = {"Pa": "_pa", "1": "", "rad": "_rad"}[LAYOUT.variables[name].units]
+def _parts(c: Convergence) -> dict[str, np.ndarray]:
+    """Statistics of one scalar by radius, as the layout names them."""
+    return {
+        "count": c.count,
+        "mean": c.mean,
+        "deviation": c.deviation,
+        "low": c.low,
+        "high": c.high,
+        "mean_p": c.mean_p,
+        "variance_p": c.variance_p,
+        "settled": c.settled,
+    }
+
+
+def _fit_arrays(runs: list[Run], groups: np.ndarray, fits: Fits, by_name: dict[str, Convergence]) -> dict[str, Any]:
+    parts = [_parts(by_name[name]) for name in fits.names]
+    realization = np.empty(len(runs), dtype=np.int64)
+    realization[groups] = np.arange(len(groups))[:, None]
+    return {
+        "run_confining_stress": np.array([source.confining_stress for source in runs]),
+        "run_realization": realization,
+        "parameter_name": np.array(fits.names),
+        "parameter_unit": np.array(fits.units),
+        "parameter_lower": fits.box.lower,
+        "parameter_upper": fits.box.upper,
+        "parameter_identifiable": fits.identifiable,
+        "parameter_value": fits.value,
+        "parameter_at_bound": fits.at_bound(),
+        "fit_rmse": fits.stress_rmse,
+        **{f"parameter_{part}": np.array([p[part] for p in parts]) for part in parts[0]},
+    }
+
+
+def _row(name: str, c: Convergence, units: str | None) -> dict[str, Any]:
+    if units is None:
+        units = {"Pa": "_pa", "1": "", "rad": "_rad"}[LAYOUT.variables[name].units]
     return {
         "name": name,
         f"mean{units}": float(c.mean[-1]),
@@ -130,7 +177,7 @@ def _row(name: str, c: Convergence) -> dict[str, Any]:
     }
 
 
-def _read(inputs: Sequence[Path], progress: Progress) -> list[Run]:
+def _read(inputs: Sequence[Path], scene: RevStudyScene, progress: Progress) -> list[Run]:
     """All runs; every fault of any of them at once."""
     runs: list[Run] = []
     faults: list[Fault] = []
@@ -140,14 +187,19 @@ def _read(inputs: Sequence[Path], progress: Progress) -> list[Run]:
             runs.append(read_run(path))
         except BadInput as error:
             faults += error.faults
-    for other in runs[1:]:
+    for other in runs[1:] if scene.calibration is None else []:
         first = runs[0].confining_stress
-        if abs(other.confining_stress - first) > 1e-6 * max(abs(first), 1.0):
+        if not _same_stress(other, runs[0]):
             found, expected = (
                 f"{other.confining_stress:g} Pa",
-                f"{first:g} Pa as in {runs[0].path.name}: one study per lateral stress",
+                f"{first:g} Pa as in {runs[0].path.name}: one study per lateral stress, unless it calibrates",
             )
             faults.append(Fault(str(other.path), "confining_stress", found, expected))
+    for k, other in enumerate(runs):
+        twins = [r for r in runs[:k] if r.seed == other.seed >= 0 and _same_stress(r, other)]
+        if twins:
+            expected = f"another seed than {twins[0].path.name}: the same rock twice is one realization"
+            faults.append(Fault(str(other.path), "seed", str(other.seed), expected))
     for source in runs:
         if source.history.time.size < 3:
             faults.append(
@@ -156,6 +208,35 @@ def _read(inputs: Sequence[Path], progress: Progress) -> list[Run]:
     if faults:
         raise BadInput(faults)
     return runs
+
+
+def _same_stress(a: Run, b: Run) -> bool:
+    return abs(a.confining_stress - b.confining_stress) <= 1e-6 * max(abs(a.confining_stress), 1.0)
+
+
+def _realizations(runs: list[Run]) -> np.ndarray:
+    """(realization, confinement) indices of runs; a realization is one seed at every lateral stress, weakest first.
+
+    Runs whose seed is not known belong together in the order in which they come at each lateral stress.
+    """
+    levels: list[list[int]] = []
+    for k in sorted(range(len(runs)), key=lambda k: abs(runs[k].confining_stress)):
+        if levels and _same_stress(runs[levels[-1][0]], runs[k]):
+            levels[-1].append(k)
+        else:
+            levels.append([k])
+    for level in levels:
+        level.sort(key=lambda k: runs[k].seed)
+    seeds = [[runs[k].seed for k in level] for level in levels]
+    faults = []
+    for level, found in zip(levels, seeds):
+        if found != seeds[0]:
+            stress = f"lateral stress {runs[level[0]].confining_stress:g} Pa"
+            expected = f"seeds {seeds[0]}, as at {runs[levels[0][0]].confining_stress:g} Pa"
+            faults.append(Fault(", ".join(str(runs[k].path) for k in level), stress, f"seeds {found}", expected))
+    if faults:
+        raise BadInput(faults)
+    return np.array(levels, dtype=np.int64).T
 
 
 def _centres(runs: list[Run], scene: RevStudyScene) -> np.ndarray:
@@ -239,7 +320,7 @@ def _arrays(runs: list[Run], centres: np.ndarray, samples: list[Sample], scene: 
         "radius": np.asarray(scene.samples.radii),
         "centre_position": centres,
         "run_name": np.array([source.path.stem for source in runs]),
-        "confining_stress": runs[0].confining_stress,
+        "confining_stress": min((source.confining_stress for source in runs), key=abs),
         "area": gathered([area for _, _, area, _ in samples]),
         "block_count": gathered([blocks for *_, blocks in samples]),
         "stress": gathered([padded(s) for s, *_ in samples]),
@@ -248,11 +329,13 @@ def _arrays(runs: list[Run], centres: np.ndarray, samples: list[Sample], scene: 
     }
 
 
-def _statistics(arrays: dict[str, Any], criteria: Criteria, scene: RevStudyScene) -> dict[str, Convergence]:
+def _statistics(
+    arrays: dict[str, Any], criteria: Criteria, scene: RevStudyScene, independent: np.ndarray
+) -> dict[str, Convergence]:
     """Convergence of each scalar that has a value at every radius."""
     by_name = {}
     for k, name in enumerate(MEASURES):
         values = arrays[name]
         if np.isfinite(values).any(axis=(1, 2)).all():
-            by_name[name] = convergence(values, criteria, scene.seed + k)
+            by_name[name] = convergence(values, criteria, scene.seed + k, independent)
     return by_name

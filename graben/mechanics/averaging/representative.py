@@ -60,7 +60,7 @@ class Convergence:
         return np.logical_and.accumulate(both[::-1])[::-1]
 
 
-def convergence(values: Floats, criteria: Criteria, seed: int) -> Convergence:
+def convergence(values: Floats, criteria: Criteria, seed: int, independent: Floats | None = None) -> Convergence:
     """Statistics and tests of one scalar.
 
     Parameters
@@ -68,6 +68,8 @@ def convergence(values: Floats, criteria: Criteria, seed: int) -> Convergence:
     values : (radius, centre, run), radii rising; nan where a sample has no such value (left out, and counted)
     criteria : what counts as settled
     seed : of the bootstrap
+    independent : (radius,) what the samples are worth, see `independent_samples`; with three runs or more, the
+        chi-squared test counts no more samples than that
 
     Raises
     ------
@@ -80,7 +82,10 @@ def convergence(values: Floats, criteria: Criteria, seed: int) -> Convergence:
     if (count == 0).any():
         raise ValueError(f"no sample has a value at radius number {int(np.argmin(count)) + 1}")
     mean = np.array([flat[k, known[k]].mean() for k in range(radii)])
-    deviation = np.array([flat[k, known[k]].std(ddof=1) if count[k] > 1 else 0.0 for k in range(radii)])
+    if values.shape[2] >= 3:
+        deviation = np.array([_deviation_over_runs(values[k]) for k in range(radii)])
+    else:
+        deviation = np.array([flat[k, known[k]].std(ddof=1) if count[k] > 1 else 0.0 for k in range(radii)])
     low, high = bootstrap_interval(values, criteria.confidence, criteria.resamples, seed)
     alpha = 1.0 - criteria.confidence
     margin = criteria.tolerance * abs(float(mean[-1]))
@@ -88,7 +93,10 @@ def convergence(values: Floats, criteria: Criteria, seed: int) -> Convergence:
     variance_p = np.full(radii, np.nan)
     tested = (count > 1) & (mean != 0.0)
     limit = criteria.variation * np.abs(mean[tested])
-    freedom = count[tested] - 1
+    worth = count.astype(np.float64)
+    if independent is not None and values.shape[2] >= 3:
+        worth = np.minimum(worth, np.maximum(independent, 2.0))
+    freedom = worth[tested] - 1.0
     variance_p[tested] = stats.chi2.cdf(freedom * (deviation[tested] / limit) ** 2, freedom)
     return Convergence(
         count=count,
@@ -101,6 +109,22 @@ def convergence(values: Floats, criteria: Criteria, seed: int) -> Convergence:
         mean_settled=mean_p < alpha,
         variance_settled=variance_p < alpha,
     )
+
+
+def _deviation_over_runs(values: Floats) -> float:
+    """Standard deviation of single samples (centre, run) of independent runs.
+
+    Samples of one run overlap, so they scatter less among themselves than samples of different runs. The variance
+    of one sample is that of the runs' means plus the mean variance within runs (about the run's own mean, over n):
+    without bias, however much the samples of a run have in common.
+    """
+    known = np.isfinite(values)
+    n = known.sum(axis=0)
+    kept, size = values[:, n > 0], n[n > 0]
+    means = np.nansum(kept, axis=0) / size
+    within = np.nansum((kept - means) ** 2, axis=0) / size
+    between = float(means.var(ddof=1)) if means.size > 1 else 0.0
+    return float(np.sqrt(between + within.mean()))
 
 
 def _equivalence_p(here: Floats, there: Floats, margin: float) -> float:

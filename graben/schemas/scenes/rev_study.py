@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import field_validator, model_validator
 
 from graben.schemas.quantities import Length, key
-from graben.schemas.scene import Model, Scene
+from graben.schemas.scene import InputFile, Model, Scene
 
 Property = Literal["secant_modulus", "poisson_ratio", "peak_stress", "strain_at_peak", "dilation"]
 
@@ -52,6 +52,17 @@ class Tests(Model):
     )
 
 
+class Calibration(Model):
+    """Fit a law to the curves of every sample; its parameters are then what must settle (Y 4.4)."""
+
+    scene: InputFile = key(
+        ..., "scene of kind calibrate: law, bounds and weights (its curves are not used)", examples=["calibrate.toml"]
+    )
+    properties: tuple[str, ...] = key(
+        (), "parameters that must settle; none: those that the curves of the largest radius can tell"
+    )
+
+
 class RevStudyScene(Scene):
     """How large must the representative area be?"""
 
@@ -59,6 +70,7 @@ class RevStudyScene(Scene):
     samples: Samples = key(Samples(), "where the averages are taken")
     curves: Curves = key(Curves(), "what is read off the average curves")
     tests: Tests = key(Tests(), "when a scalar counts as settled")
+    calibration: Calibration | None = key(None, "calibrated parameters instead of scalars of the curves (off)")
     processes: int = key(
         0, "processes that share the samples (0: one per core); the result is the same", ge=0, le=1024
     )

@@ -120,3 +120,20 @@ def test_independent_samples():
     assert np.allclose(independent_samples(apart, np.array([1.0]), 2), [6.0], rtol=0.03)
     together = np.zeros((5, 2))
     assert np.allclose(independent_samples(together, np.array([1.0, 2.0]), 3), [3.0, 3.0], rtol=0.02)
+
+
+def test_overlapping_samples_of_few_runs_count_as_what_they_are_worth():
+    """Nine samples of a run that differ little are no evidence of small scatter; the deviation has no bias."""
+    rng = np.random.Generator(np.random.PCG64(8))
+    between, within, runs, places = 1.0, 0.5, 4, 9
+    variances = []
+    for _ in range(1000):
+        values = 10.0 + rng.normal(0, between, (1, 1, runs)) + rng.normal(0, within, (1, places, runs))
+        variances.append(convergence(values, Criteria(resamples=100), 0).deviation[0] ** 2)
+    assert np.mean(variances) == pytest.approx(between**2 + within**2, rel=0.08)
+    # 27 samples would show a small scatter; the three that they are worth do not.
+    same = 10.0 + np.tile(rng.normal(0, 0.3, (2, 1, 3)), (1, 9, 1))
+    many = convergence(same, Criteria(variation=0.05), 0)
+    few = convergence(same, Criteria(variation=0.05), 0, np.full(2, 3.0))
+    assert many.variance_p[0] < few.variance_p[0]
+    assert few.variance_p[0] == pytest.approx(stats.chi2.cdf(2 * (few.deviation[0] / (0.05 * few.mean[0])) ** 2, 2))
