@@ -11,9 +11,12 @@ from graben.cli.options import Session, Tool, scene_argument, set_option, stage_
 
 @click.command("dem-run", cls=Tool)
 @scene_argument
+@click.option("--restart", is_flag=True, help="Go on from the checkpoint that a stopped run of blocks left.")
 @set_option
 @stage_options
-def main(session: Session, scene: Path, overrides: tuple[str, ...], output: Path, overwrite: bool) -> None:
+def main(
+    session: Session, scene: Path, restart: bool, overrides: tuple[str, ...], output: Path, overwrite: bool
+) -> None:
     """Run a scene of discrete rock (kind "blocks") or of grains (kind "particles").
 
     Writes one NetCDF artifact, and VTU files with a PVD beside it for ParaView.
@@ -21,5 +24,7 @@ def main(session: Session, scene: Path, overrides: tuple[str, ...], output: Path
     from graben.stages import dem_run
 
     with session.progress() as progress:
-        headline = dem_run.run(scene, output, overrides=overrides, overwrite=overwrite, progress=progress)
+        headline = dem_run.run(
+            scene, output, overrides=overrides, overwrite=overwrite, restart=restart, progress=progress
+        )
     session.report(headline)

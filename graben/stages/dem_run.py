@@ -7,6 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import refuse_existing
 from graben.schemas.scene import load_scene
 from graben.stages.record import Progress, silent
@@ -18,9 +19,12 @@ def run(
     *,
     overrides: Iterable[str] = (),
     overwrite: bool = False,
+    restart: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Run the scene and write its artifact; returns the headline numbers of the stage of its kind.
+
+    restart : go on from the checkpoint that a stopped run left beside the output (kind "blocks")
 
     Raises
     ------
@@ -30,4 +34,8 @@ def run(
     scene = load_scene(scene_path, ("blocks", "particles"), overrides)
     refuse_existing(output, overwrite)
     stage = import_module(f"graben.stages.{scene.kind}")
-    return stage.run(scene, output, progress=progress)
+    if not restart:
+        return stage.run(scene, output, progress=progress)
+    if scene.kind != "blocks":
+        raise BadInput(Fault(str(scene_path), "--restart", "", 'a scene of kind "blocks"; others start anew'))
+    return stage.run(scene, output, restart=True, progress=progress)

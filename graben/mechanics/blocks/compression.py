@@ -77,25 +77,25 @@ def compress(
     save: Callable[[int, BlockModel], None],
     *,
     ramp_share: float = 0.01,
+    saved: int = 0,
 ) -> None:
     """Move the top at `speed` [m/s, negative: down] for `steps` steps; call save(k, model) at `states` states.
 
     State 0 is the start. The speed rises over the first `ramp_share` of the steps. The pressure on the top is
-    dropped: the wall now carries it.
+    dropped: the wall now carries it. saved : states that a model brought back from a snapshot has behind it.
     """
-    b, s = model.bodies, model.skeleton
-    sides = rectangle_sides(b.outline)
-    top = b.vertex_side[:, sides.top]
-    model.motion.tally[:] = 0.0
-    model.motion.sums[rx.FRICTION] = 0.0
-    save(0, model)
-    s.steady[top, 1] = model.weight[top, 1]
-    model.hold(top, 1, speed)
-    d = model.motion.drive
-    d[rx.SPEED], d[rx.SPEED_STEP] = 0.0, 1.0 / max(1.0, ramp_share * steps)
-    done = 0
-    for k in range(1, states):
-        target = round(steps * k / (states - 1))
-        model.advance(target - done)
-        done = target
+    b = model.bodies
+    top = b.vertex_side[:, rectangle_sides(b.outline).top]
+    if saved == 0:
+        model.motion.tally[:] = 0.0
+        model.motion.sums[rx.FRICTION] = 0.0
+        save(0, model)
+        saved = 1
+    if saved == 1:
+        model.skeleton.steady[top, 1] = model.weight[top, 1]
+        model.hold(top, 1, speed)
+        d = model.motion.drive
+        d[rx.SPEED], d[rx.SPEED_STEP] = 0.0, 1.0 / max(1.0, ramp_share * steps)
+    for k in range(saved, states):
+        model.advance(round(steps * k / (states - 1)) - round(steps * (k - 1) / (states - 1)))
         save(k, model)

@@ -60,6 +60,27 @@ class History:
         self.overlap.append(float(m.motion.sums[rx.LARGEST_OVERLAP]))
         self.damping.append(float(m.motion.drive[rx.DAMPING]))
 
+    def stored(self, states: int) -> dict[str, np.ndarray]:
+        """The first saved states as arrays that `bring_back` takes."""
+        result = {"reference": self.reference, "start_time": np.array(self.start_time)}
+        for name in ("time", "overlap", "damping"):
+            result[name] = np.array(getattr(self, name)[:states])
+        for name, rows in self.rows.items():
+            sizes = [len(r) for r in rows[:states]]
+            result[f"{name}.sizes"] = np.array(sizes, dtype=np.int64)
+            result[f"{name}.rows"] = np.concatenate(rows[:states])
+        return result
+
+    def bring_back(self, stored: dict[str, np.ndarray]) -> None:
+        """Take up the states of `stored`."""
+        self.reference = stored["reference"]
+        self.start_time = float(stored["start_time"])
+        for name in ("time", "overlap", "damping"):
+            setattr(self, name, stored[name].tolist())
+        for name in self.rows:
+            ends = np.cumsum(stored[f"{name}.sizes"])[:-1]
+            self.rows[name] = np.split(stored[f"{name}.rows"], ends)
+
     def arrays(self) -> dict[str, np.ndarray]:
         """Arrays of all saved states, named as in the artifact; contacts are ragged over time."""
         b, rows = self.model.bodies, self.rows

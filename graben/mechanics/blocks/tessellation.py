@@ -107,6 +107,21 @@ def from_polygons(shapes: list[np.ndarray], outline: np.ndarray) -> Tessellation
     return _conforming(np.vstack(shapes), start, np.arange(start[-1]), np.asarray(outline, float), check=False)
 
 
+def without(tessellation: Tessellation, holes: list[np.ndarray]) -> Tessellation:
+    """The blocks whose centroid lies in none of the holes (polygons (m, 2) [m])."""
+    points, start, corner = tessellation.points, tessellation.start, tessellation.corner
+    _, centre = polygons.areas_and_centroids(points, start, corner)
+    gone = np.zeros(len(centre), dtype=bool)
+    for hole in holes:
+        gone |= polygons.inside(centre, hole)
+    if not gone.any():
+        return tessellation
+    if gone.all():
+        raise ValueError("holes: no block is left")
+    rings = [corner[a:b].tolist() for k, (a, b) in enumerate(itertools.pairwise(start)) if not gone[k]]
+    return _from_rings(points, rings, tessellation.outline)
+
+
 def _random_points(outline: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
     low, high = outline.min(axis=0), outline.max(axis=0)
     found = np.empty((0, 2))

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from graben.schemas.artifact import Layout, Variable
 
-_T, _V, _Z, _B, _C = ("time",), ("vertex",), ("zone",), ("block",), ("contact",)
+_T, _V, _Z, _B, _C, _L = ("time",), ("vertex",), ("zone",), ("block",), ("contact",), ("look",)
 
 
 def _energy(long_name: str) -> Variable:
     return Variable(_T, "J m-1", long_name)
+
+
+def _rising(dims: tuple[str, ...], units: str, long_name: str) -> Variable:
+    """Known only for pressures that rise."""
+    return Variable(dims, units, long_name, optional=True)
 
 
 LAYOUT = Layout(
@@ -26,6 +31,8 @@ LAYOUT = Layout(
         "pair": "first and second block of a contact",
         "wall": "sides of the domain, from corner k of the outline to corner k + 1",
         "axis": "x, y (y is up)",
+        "look": "moments at which rising pressures were looked at",
+        "surface": "vertices of the free and loaded outline, along it",
         "component": "xx, yy, zz, xy",
     },
     variables={
@@ -71,6 +78,14 @@ LAYOUT = Layout(
         "energy_boundary": _energy("work of moving walls since the first state"),
         "energy_external": _energy("work of pressures and gravity since the first state"),
         "energy_error": _energy("work done on the blocks less everything accounted for"),
+        "load_time": _rising(_T, "s", "time for which pressures have risen, waiting not counted"),
+        "look_load_time": _rising(_L, "s", "time for which pressures had risen, waiting not counted"),
+        "look_settlement": _rising(_L, "m", "displacement along the rising pressures, mean over the loaded length"),
+        "look_imbalance": _rising(_L, "1", "mean unbalanced force over mean zone force"),
+        "surface_vertex": Variable(("surface",), "1", "vertex of the outline", dtype="i4", optional=True),
+        "surface_carried_displacement": _rising(
+            ("surface", "axis"), "m", "displacement of the outline when the last wait began: the last load carried"
+        ),
     },
     attributes={"thickness_m": "1"},
 )

@@ -2,19 +2,56 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import model_validator
 
-from graben.schemas.quantities import Angle, Density, JointStiffness, Length, Pressure, Speed, Time, key
+from graben.schemas.quantities import (
+    Acceleration,
+    Angle,
+    Density,
+    JointStiffness,
+    Length,
+    Pressure,
+    PressureRate,
+    Speed,
+    Time,
+    key,
+)
 from graben.schemas.scene import Model, Scene
+
+Point = tuple[Length, Length]
+
+_SLOPE_SUPPORTS: Any = [
+    {"name": "left", "start": ["0 m", "0 m"], "end": ["0 m", "20 m"], "fix": "x"},
+    {"name": "right", "start": ["80 m", "0 m"], "end": ["80 m", "50 m"], "fix": "x"},
+    {"name": "base", "start": ["0 m", "0 m"], "end": ["80 m", "0 m"], "fix": "y"},
+]
+_SLOPE_LOADS: Any = [{"name": "backslope", "start": ["55 m", "50 m"], "end": ["60 m", "50 m"], "rate": "0.25 MPa/s"}]
 
 
 class Domain(Model):
-    """The upright rectangle that the blocks fill."""
+    """What the blocks fill: an upright rectangle, or any simple polygon."""
 
-    width: Length = key("10 m", "width", gt=0)
-    height: Length = key("10 m", "height", gt=0)
+    width: Length = key("10 m", "width of the rectangle", gt=0)
+    height: Length = key("10 m", "height of the rectangle", gt=0)
+    outline: list[Point] | None = key(
+        None, "corner points of a polygon, in order around it, instead of the rectangle", min_length=3
+    )
+    holes: list[list[Point]] = key([], "polygons in the domain: blocks whose middle lies in one are left out")
+
+    @property
+    def corners(self) -> list[Point]:
+        """Corner points of the outline [m]."""
+        if self.outline is not None:
+            return self.outline
+        w, h = self.width, self.height
+        return [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)]
+
+    @property
+    def smallest_side(self) -> float:
+        """Smaller side of the box around the domain [m]."""
+        return min(max(c[k] for c in self.corners) - min(c[k] for c in self.corners) for k in (0, 1))
 
 
 class Tessellation(Model):
@@ -57,10 +94,59 @@ class Loading(Model):
     states: int = key(51, "saved states, the first before loading", ge=2)
 
 
+class Support(Model):
+    """No displacement along a segment of the outline."""
+
+    name: str = key("support", "name, for messages")
+    start: Point = key(..., "one end of the segment")
+    end: Point = key(..., "the other end")
+    fix: Literal["x", "y", "both"] = key("both", "displacement held at zero: x or y (a roller), or both")
+
+
+class Load(Model):
+    """Pressure on a part of the outline, dead: it keeps the direction and length of the undeformed outline."""
+
+    name: str = key("load", "name, for messages")
+    start: Point = key(..., "one end of the loaded segment")
+    end: Point = key(..., "the other end")
+    pressure: Pressure = key("0 Pa", "pressure from the start, applied with gravity; pushes into the body")
+    rate: PressureRate = key("0 Pa/s", "rise of the pressure after gravity", ge=0)
+
+
+class Programme(Model):
+    """Weight and steady pressures until rest, then pressures that rise until the rock fails; instead of [loading]."""
+
+    horizontal: Acceleration = key("0 m/s^2", "gravity along x")
+    vertical: Acceleration = key("-9.81 m/s^2", "gravity along y (upwards positive)")
+    supports: list[Support] = key(_SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)")
+    loads: list[Load] = key(_SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)")
+    end: Time = key("100 s", "time of rise after which the run ends without failure (waiting not counted)", gt=0)
+    save_every: Time = key("4 s", "time of rise between saved states", gt=0)
+    calm: float = key(
+        5e-3,
+        "loads rise while the mean unbalanced force over the mean zone force is below this, else they wait",
+        gt=0,
+    )
+    patience: int = key(
+        8000,
+        "steps of waiting after which the rock has failed, if the loaded ground still sinks faster than at first; "
+        "four times as many if it does not",
+        ge=1000,
+    )
+
+    @model_validator(mode="after")
+    def _something_holds(self) -> Programme:
+        if not self.supports:
+            raise ValueError("at least one support")
+        return self
+
+
 class Numerics(Model):
     """Knobs that trade accuracy for time; left out, fidelity sets them."""
 
-    steps: int | None = key(None, "steps of loading: fewer means heavier scaled masses, so more inertia", gt=100)
+    steps: int | None = key(
+        None, "steps of loading (of a programme's end): fewer means heavier scaled masses, so more inertia", gt=100
+    )
     damping_ratio: float = key(0.5, "power of the adaptive damping over the rate of kinetic energy", gt=0)
     consolidation_tolerance: float = key(1e-3, "unbalanced over mean zone force that ends consolidation", gt=0)
     energy_limit: float = key(0.05, "largest error of the energy ledger over the work done", gt=0)
@@ -73,14 +159,17 @@ class Output(Model):
 
 
 class BlocksScene(Scene):
-    """A rectangle of jointed rock, compressed to failure under confinement."""
+    """Jointed rock, compressed to failure under confinement, or loaded by its weight and by rising pressures."""
 
     kind: Literal["blocks"]
     domain: Domain = key(default_factory=Domain, description="domain")
     tessellation: Tessellation = key(default_factory=Tessellation, description="blocks")
     rock: Rock = key(default_factory=Rock, description="blocks' rock")
     joints: Joints = key(default_factory=Joints, description="joints")
-    loading: Loading = key(default_factory=Loading, description="loading")
+    loading: Loading = key(default_factory=Loading, description="biaxial compression of a rectangle")
+    programme: Programme | None = key(
+        None, "weight and rising pressures on any outline, instead of [loading]; the defaults are Y's slope, 4.5"
+    )
     numerics: Numerics = key(default_factory=Numerics, description="numerics")
     output: Output = key(default_factory=Output, description="files")
 
@@ -88,14 +177,18 @@ class BlocksScene(Scene):
     def _consistent(self) -> BlocksScene:
         faults = []
         t, d = self.tessellation, self.domain
-        if t.edge > 0.5 * min(d.width, d.height):
+        if t.edge > 0.5 * d.smallest_side:
             faults.append(f"tessellation.edge of at most half the domain (found {t.edge:.4g} m)")
         if t.rounding > 0.25 * t.edge:
             faults.append(f"tessellation.rounding of at most a quarter of the edge (found {t.rounding:.4g} m)")
         if t.shortest_edge is not None and t.shortest_edge > t.edge:
             faults.append(f"tessellation.shortest_edge below the edge (found {t.shortest_edge:.4g} m)")
         strain = self.loading.speed * self.loading.duration / d.height
-        if strain > 0.5:
+        if self.programme is not None and "loading" in self.model_fields_set:
+            faults.append("either [loading] or [programme]")
+        elif self.programme is None and d.outline is not None:
+            faults.append("[programme] with a domain.outline ([loading] compresses the rectangle)")
+        elif self.programme is None and strain > 0.5:
             faults.append(f"loading that shortens the domain by at most one half (found {strain:.3g})")
         if faults:
             raise ValueError("; ".join(faults))

@@ -8,7 +8,7 @@ import numpy as np
 
 
 def draw(dataset: Any, figure: Any) -> None:
-    """Blocks at the last state coloured by vertical stress; wall stress and averaged lateral stress over strain."""
+    """Blocks at the last state coloured by vertical stress; stress over strain, or settlement under a rising load."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
@@ -34,6 +34,30 @@ def draw(dataset: Any, figure: Any) -> None:
     left.set_title(f"t = {float(dataset.time[-1]):.3g} s; sliding joints red")
     figure.colorbar(field, ax=left, label="vertical compression, MPa", shrink=0.6)
 
+    if "look_settlement" in dataset:
+        _rising(dataset, right)
+    else:
+        _compression(dataset, right)
+    figure.suptitle(f"{dataset.sizes['block']} blocks, {dataset.sizes['zone']} zones")
+
+
+def _rising(dataset: Any, axis: Any) -> None:
+    """Settlement against the time for which pressures rose; the surface at the last load carried, below."""
+    axis.plot(dataset.look_settlement.values * 1e3, dataset.look_load_time.values)
+    axis.plot(0.0, 0.0, ".", color="none")
+    axis.set_xlabel("settlement of the loaded ground, mm")
+    axis.set_ylabel("time for which pressures rose, s")
+    low = axis.inset_axes((0.42, 0.1, 0.55, 0.4))
+    x = dataset.vertex_position.values[dataset.surface_vertex.values]
+    level = x[:, 1] > x[:, 1].max() - 0.05 * np.ptp(x[:, 1])
+    low.plot(x[level, 0], dataset.surface_carried_displacement.values[level, 1] * 1e3, ".", ms=2, color="0.2")
+    low.set_xlabel("x, m", fontsize=8)
+    low.set_title("top surface at the last load carried, mm", fontsize=8)
+    low.tick_params(labelsize=8)
+
+
+def _compression(dataset: Any, right: Any) -> None:
+    """Stress of the top wall and of the zones inside, over nominal strain."""
     outline = dataset.outline.values
     size = np.ptp(outline, axis=0)
     top = int(np.argmax(0.5 * (outline + np.roll(outline, -1, axis=0))[:, 1]))
@@ -52,4 +76,3 @@ def draw(dataset: Any, figure: Any) -> None:
     right.set_xlabel("nominal axial strain, %")
     right.set_ylabel("compression, MPa")
     right.legend(frameon=False)
-    figure.suptitle(f"{dataset.sizes['block']} blocks, {dataset.sizes['zone']} zones")

@@ -1,0 +1,97 @@
+"""Biaxial compression of a rectangle of blocks: consolidation, then the top moves down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from graben.mechanics.blocks.compression import compress, consolidate, rectangle_sides
+from graben.mechanics.blocks.history import History, mean_stress
+from graben.mechanics.blocks.model import BlockModel
+from graben.schemas.scenes.blocks import BlocksScene
+from graben.stages.record import Progress
+
+
+class Biaxial:
+    """The test that a scene's [loading] describes."""
+
+    ERRORS = (
+        "energy_error",
+        "kinetic_over_stored_energy",
+        "lateral_over_applied_stress",
+        "bottom_over_top_reaction",
+    )
+
+    def __init__(self, scene: BlocksScene, model: BlockModel, steps: int) -> None:
+        self.scene, self.model, self.steps = scene, model, steps
+        self.rest = np.zeros(2)  # unbalanced force ratio of consolidation, its steps
+
+    def begin(self) -> None:
+        """Consolidate."""
+        pressure = self.scene.loading.confining_pressure
+        ratio = consolidate(
+            self.model,
+            -pressure,
+            -pressure * self.scene.loading.vertical_ratio,
+            tolerance=self.scene.numerics.consolidation_tolerance,
+        )
+        self.rest = np.array([ratio, self.model.steps_done])
+
+    def go_on(self, history: History, save: Callable[[], None], progress: Progress) -> None:
+        """Compress from the last saved state to the end."""
+        states = self.scene.loading.states
+
+        def saved(k: int, _: BlockModel) -> None:
+            save()
+            progress(k / (states - 1), f"state {k} of {states - 1}")
+
+        compress(self.model, -self.scene.loading.speed, self.steps, states, saved, saved=len(history.time))
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What a checkpoint must hold beside the model."""
+        return {"rest": self.rest}
+
+    def bring_back(self, state: dict[str, np.ndarray]) -> None:
+        self.rest = state["rest"]
+
+    def arrays(self, history: History) -> dict[str, np.ndarray]:
+        """Arrays of the artifact that only this test has."""
+        return {"confining_stress": np.array(-self.scene.loading.confining_pressure)}
+
+    def headline(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+        """Peak of the top wall's mean stress (Pa, compression negative), nominal strain there, error measures."""
+        sides = rectangle_sides(self.model.bodies.outline)
+        push = arrays["wall_reaction"]
+        size = np.ptp(self.model.bodies.outline, axis=0)
+        vertical = push[:, sides.top, 1] / size[0]
+        peak = int(np.argmin(vertical))
+        middle = arrays["vertex_position"][arrays["zone_vertex"]].mean(axis=1)
+        inside = np.hypot(*(middle - size / 2.0).T) < 0.4 * size.min()
+        area = self.model.skeleton.area
+        lateral = mean_stress(arrays["zone_stress"], area, inside if inside.any() else area > 0.0)[:, 0]
+        after = slice(1, peak + 1) if peak > 0 else slice(None)
+        return {
+            "blocks": len(arrays["block_area"]),
+            "confining_stress_pa": float(arrays["confining_stress"]),
+            "peak_wall_stress_pa": float(vertical[peak]),
+            "strain_at_peak": float(-self.scene.loading.speed * arrays["time"][peak] / size[1]),
+            "steps": self.model.steps_done,
+            "energy_error": energy_error(arrays),
+            "kinetic_over_stored_energy": float(kinetic_share(arrays)[after].mean()),
+            "lateral_over_applied_stress": float(lateral[after].mean() / arrays["confining_stress"]),
+            "bottom_over_top_reaction": float((push[after, sides.bottom, 1] / -push[after, sides.top, 1]).mean()),
+        }
+
+
+def energy_error(arrays: dict[str, np.ndarray]) -> float:
+    """Largest error of the ledger over the work done and the energy stored."""
+    stored = arrays["energy_strain"] + arrays["energy_joint"]
+    work = abs(arrays["energy_boundary"]) + abs(arrays["energy_external"]) + stored
+    return float((np.abs(arrays["energy_error"]) / work).max())
+
+
+def kinetic_share(arrays: dict[str, np.ndarray]) -> np.ndarray:
+    """Kinetic over stored energy per state."""
+    return arrays["energy_kinetic"] / (arrays["energy_strain"] + arrays["energy_joint"])

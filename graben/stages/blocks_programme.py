@@ -1,0 +1,167 @@
+"""Weight and steady pressures on any outline, then pressures that rise until the rock fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, fields
+from typing import Any
+
+import numpy as np
+
+from graben.mechanics.blocks import programme as mechanics
+from graben.mechanics.blocks import relaxation as rx
+from graben.mechanics.blocks.history import History
+from graben.mechanics.blocks.model import BlockModel
+from graben.schemas.scenes.blocks import BlocksScene, Programme
+from graben.stages.blocks_biaxial import energy_error, kinetic_share
+from graben.stages.record import Progress
+
+
+class Rising:
+    """The test that a scene's [programme] describes. ValueError where a segment is not on the outline."""
+
+    ERRORS = ("energy_error", "kinetic_over_stored_energy", "inertia_over_load")
+
+    def __init__(self, scene: BlocksScene, model: BlockModel, steps: int) -> None:
+        assert scene.programme is not None
+        self.scene, self.model = scene, model
+        self.programme: Programme = scene.programme
+        self.control = mechanics.Control(self.programme.calm, self.programme.patience)
+        self.rise = mechanics.Rise()
+        self.looks: list[tuple[float, float, float]] = []
+        self.load_times: list[float] = []
+        self.rest = np.zeros(2)
+        self.carried = model.bodies.position.copy()
+        self.next_save = 0.0
+        b = model.bodies
+        for support in self.programme.supports:
+            at = mechanics.on_segment(b, np.array(support.start), np.array(support.end))
+            if not at.any():
+                raise ValueError(f"support {support.name!r}: no part of the outline lies on its segment")
+            for axis, name in enumerate("xy"):
+                if support.fix in (name, "both"):
+                    model.hold(at, axis)
+        self._rising = np.zeros_like(b.position)
+        for load in self.programme.loads:
+            try:
+                unit = mechanics.pressure_forces(b, np.array(load.start), np.array(load.end))
+            except ValueError as error:
+                raise ValueError(f"load {load.name!r}: {error}") from error
+            model.skeleton.steady[:] += load.pressure * unit
+            self._rising += load.rate * unit
+
+    def begin(self) -> None:
+        """Bring the body to rest under its weight and steady pressures."""
+        ratio = mechanics.come_to_rest(self.model, self.scene.numerics.consolidation_tolerance)
+        self.rest = np.array([ratio, self.model.steps_done])
+        self.carried = self.model.motion.x.copy()
+
+    def go_on(self, history: History, save: Callable[[], None], progress: Progress) -> None:
+        """Raise the pressures from the last saved state to failure or to the end."""
+        m, p, rise = self.model, self.programme, self.rise
+        if not history.time:
+            m.skeleton.rising[:] = self._rising
+            m.motion.tally[:] = 0.0
+            m.motion.sums[rx.FRICTION] = 0.0
+            self._save(save)
+        if not self._rising.any():
+            return
+        while rise.load_time < p.end * (1.0 - 1e-9) and not rise.failed:
+            if rise.waited == 0:
+                self.carried = m.motion.x.copy()
+            mechanics.look_at(m, rise, self.control, p.end, history.reference)
+            self.looks.append((rise.load_time, rise.settlement, rise.imbalance))
+            if rise.failed or rise.load_time >= self.next_save:
+                self._save(save)
+            wait = f", waiting for {rise.waited} steps" if rise.waited else ""
+            progress(
+                min(1.0, rise.load_time / p.end),
+                f"load time {rise.load_time:.4g} s, settlement {rise.settlement:.3g} m{wait}",
+            )
+
+    def _save(self, save: Callable[[], None]) -> None:
+        self.load_times.append(self.rise.load_time)
+        while self.next_save <= self.rise.load_time:
+            self.next_save += self.programme.save_every
+        save()
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What a checkpoint must hold beside the model."""
+        return {
+            "rest": self.rest,
+            "looks": np.array(self.looks).reshape(-1, 3),
+            "load_times": np.array(self.load_times),
+            "carried": self.carried,
+            "next_save": np.array(self.next_save),
+            **{f"rise_{k}": np.array(v) for k, v in asdict(self.rise).items()},
+        }
+
+    def bring_back(self, state: dict[str, np.ndarray]) -> None:
+        self.rest, self.carried = state["rest"], state["carried"]
+        self.looks = [tuple(row) for row in state["looks"].tolist()]
+        self.load_times = state["load_times"].tolist()
+        self.next_save = float(state["next_save"])
+        self.rise = mechanics.Rise(**{f.name: state[f"rise_{f.name}"].item() for f in fields(mechanics.Rise)})
+
+    def arrays(self, history: History) -> dict[str, np.ndarray]:
+        """Arrays of the artifact that only this test has."""
+        looks = np.array(self.looks).reshape(-1, 3)
+        surface = self._surface()
+        return {
+            "confining_stress": np.array(0.0),
+            "load_time": np.array(self.load_times),
+            "look_load_time": looks[:, 0],
+            "look_settlement": looks[:, 1],
+            "look_imbalance": looks[:, 2],
+            "surface_vertex": surface,
+            "surface_carried_displacement": (self.carried - history.reference)[surface],
+        }
+
+    def _surface(self) -> np.ndarray:
+        """Vertices of outline edges that no support holds at both ends, along the outline."""
+        b = self.model.bodies
+        held = np.asarray(self.model.held.any(axis=1))
+        edge = np.flatnonzero((b.edge_side >= 0) & ~(held[b.edge_from] & held[b.edge_to]))
+        length = np.linalg.norm(np.roll(b.outline, -1, axis=0) - b.outline, axis=1)
+        begin = np.concatenate([[0.0], np.cumsum(length)])
+        side = b.edge_side[edge]
+        found, arc = [], []
+        for ends in (b.edge_from[edge], b.edge_to[edge]):
+            found.append(ends)
+            arc.append(begin[side] + np.linalg.norm(b.position[ends] - b.outline[side], axis=1))
+        vertex, where = np.concatenate(found), np.concatenate(arc)
+        return vertex[np.lexsort((vertex, where))].astype(np.int32)
+
+    def _inertia(self, arrays: dict[str, np.ndarray]) -> float:
+        """What supports and weight leave of the rising load: root mean square of the shares, first and last states
+        aside."""
+        load = arrays["load_time"][1:-1, None] * self._rising.sum(axis=0)
+        if not load.any():
+            return 0.0
+        total = arrays["boundary_force"][1:-1].sum(axis=1) + self.model.weight.sum(axis=0)
+        return float(np.sqrt(np.mean((total**2).sum(axis=1) / (load**2).sum(axis=1))))
+
+    def headline(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
+        """Failure load (Pa; null where the end came first), settlement of the loaded ground, error measures."""
+        reference = arrays["vertex_position"]
+        rising = [load for load in self.programme.loads if load.rate > 0.0]
+        largest = rising[0].pressure + rising[0].rate * self.rise.load_time if rising else 0.0
+        loaded = self._rising.any(axis=1)
+        sunk = -(self.carried - reference)[loaded, 1] if loaded.any() else np.zeros(1)
+        mean = (self._rising * (self.carried - reference)).sum() / max(np.hypot(*self._rising.T).sum(), 1e-300)
+        return {
+            "blocks": len(arrays["block_area"]),
+            "failure_load_pa": float(largest) if self.rise.failed else None,
+            "failed": self.rise.failed,
+            "largest_load_pa": float(largest),
+            "settlement_m": float(mean),
+            "settlement_min_m": float(sunk.min()),
+            "settlement_max_m": float(sunk.max()),
+            "settlement_rate_over_first": float(self.rise.speed / self.rise.first_speed) if self.looks else 0.0,
+            "inertia_over_load": self._inertia(arrays),
+            "imbalance": self.rise.imbalance,
+            "steps": self.model.steps_done,
+            "steps_waited": self.rise.waited_in_all,
+            "energy_error": energy_error(arrays),
+            "kinetic_over_stored_energy": float(kinetic_share(arrays)[1:-1].mean()) if len(self.looks) else 0.0,
+        }
