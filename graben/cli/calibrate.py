@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from graben.cli.options import FILE, Session, Tool, scene_argument, set_option, stage_options
+from graben.cli.options import FILE, Session, Tool, cluster_option, scene_argument, set_option, stage_options
 
 
 @click.command("calibrate", cls=Tool)
@@ -18,6 +18,15 @@ from graben.cli.options import FILE, Session, Tool, scene_argument, set_option, 
     multiple=True,
     help="Predict the curves of this file too, without fitting them (repeatable): validation_rmse_pa.",
 )
+@click.option(
+    "--compare",
+    type=FILE,
+    multiple=True,
+    metavar="SCENE.toml",
+    help="Hold the law of another scene against this one's by cross-validation on the same curves (repeatable).",
+)
+@click.option("--restart", is_flag=True, help="Go on where an interrupted run with the same output stopped.")
+@cluster_option
 @set_option
 @stage_options
 def main(
@@ -25,6 +34,9 @@ def main(
     scene: Path,
     curves: tuple[Path, ...],
     validate: tuple[Path, ...],
+    compare: tuple[Path, ...],
+    restart: bool,
+    cluster: str | None,
     overrides: tuple[str, ...],
     output: Path,
     overwrite: bool,
@@ -42,6 +54,9 @@ def main(
             output,
             curves=curves,
             validate=validate,
+            compare=compare,
+            cluster=cluster,
+            restart=restart,
             overrides=overrides,
             overwrite=overwrite,
             progress=progress,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from graben.schemas.artifact import Layout, Variable
 
 _P, _C = ("parameter",), ("curve",)
+_K = ("candidate",)
 _FIELD = ("curve", "step", "component")
 _BAND = ("member", "curve", "step")
 
@@ -25,7 +26,8 @@ LAYOUT = Layout(
         "step": "points of a curve; shorter curves are padded with nan after step_count",
         "component": "xx, yy, zz, xy of a symmetric tensor (tensor shear strain), tension positive",
         "member": "refined parameter sets whose objective is near the best, best first",
-        "generation": "generations of the swarm that led to the best set",
+        "generation": "generations of the global search that led to the best set",
+        "candidate": "scenes held against one another",
     },
     variables={
         "parameter_name": Variable(_P, "1", "name of the parameter", dtype="U"),
@@ -77,6 +79,17 @@ LAYOUT = Layout(
             optional=True,
             may_be_nan=True,
         ),
+        "candidate_name": Variable(_K, "1", "name of the scene's file; this scene first", dtype="U", optional=True),
+        "candidate_law": Variable(_K, "1", "its law", dtype="U", optional=True),
+        "candidate_parameters": Variable(_K, "1", "number of its free parameters", dtype="i8", optional=True),
+        "candidate_rmse": Variable(_K, "Pa", "axial-stress error, fitted to all curves", optional=True),
+        "candidate_holdout_rmse": Variable(
+            ("candidate", "curve"),
+            "Pa",
+            "axial-stress error of each curve predicted from a fit to the others",
+            optional=True,
+            may_be_nan=True,
+        ),
         "stress_measured": _field("Pa", "stress of the curve"),
         "strain_measured": _field("1", "strain of the curve"),
         "stress": _field("Pa", "stress of the law at the values found"),
@@ -85,6 +98,6 @@ LAYOUT = Layout(
         "member_objective": Variable(("member",), "1", "objective of each set"),
         "member_stress_rmse": Variable(("member",), "Pa", "axial-stress error of each set over the fitted curves"),
         "member_axial_stress": Variable(_BAND, "Pa", "axial stress of each set: a band", may_be_nan=True),
-        "history": Variable(("generation",), "1", "best objective of the swarm"),
+        "history": Variable(("generation",), "1", "best objective of the global search"),
     },
 )

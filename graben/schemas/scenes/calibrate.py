@@ -11,6 +11,13 @@ from graben.schemas.scene import InputFile, Model, Scene
 from graben.schemas.scenes.material import UNITS, parameter_to_si
 
 
+class Prior(Model):
+    """What is known of a parameter beforehand: a normal distribution."""
+
+    mean: str | float = key(..., "its middle, in the parameter's unit")
+    deviation: str | float = key(..., "its standard deviation, in the same unit (of a log scale: at the mean)")
+
+
 class Free(Model):
     """A free parameter."""
 
@@ -18,6 +25,7 @@ class Free(Model):
     upper: str | float = key(..., "upper bound")
     initial: str | float | None = key(None, "a guess that every swarm begins with")
     scale: Literal["linear", "log"] = key("linear", "scale on which the search moves")
+    prior: Prior | None = key(None, "knowledge from elsewhere: { mean = ..., deviation = ... }")
 
 
 class CsvFormat(Model):
@@ -40,13 +48,16 @@ class WeightTable(Model):
     )
     strain: float = key(0.05, "weight of the lateral strain relative to the axial stress", ge=0, le=100)
     penalty: float = key(2.0, "weight of the part of a curve that a candidate's path cannot reach", ge=0)
+    noise: float = key(
+        0.05, "expected misfit as a fraction of the largest stress: sets what priors weigh against curves", gt=0, le=1
+    )
 
 
 class SwarmTable(Model):
-    """Particle swarm, Y 2.6.1; keys left out follow the fidelity."""
+    """Budget of the global search and rule of the swarm, Y 2.6.1; keys left out follow the fidelity."""
 
-    starts: int | None = key(None, "swarms with different seeds", ge=1, le=1000)
-    particles: int | None = key(None, "particles of each swarm (Y: 24)", ge=2, le=100_000)
+    starts: int | None = key(None, "searches with different seeds", ge=1, le=1000)
+    particles: int | None = key(None, "particles of each swarm, or population (Y: 24)", ge=2, le=100_000)
     generations: int | None = key(None, "generations (Y: 100)", ge=0, le=100_000)
     inertia: float = key(0.73, "inertia omega of Y (2.54) (Y: 1.2)", ge=0, le=2)
     inertia_reduction: float = key(0.0, "fraction of the inertia lost in each generation (Y: 0.1)", ge=0, lt=1)
@@ -102,13 +113,19 @@ class CalibrateScene(Scene):
         None, "increments between two points of a curve; follows the fidelity", ge=1, le=1000
     )
     weights: WeightTable = key(WeightTable(), "weights of the residuals")
-    swarm: SwarmTable = key(SwarmTable(), "the global search")
+    search: Literal["swarm", "appso", "dds", "differential-evolution", "cma-es"] = key(
+        "swarm", "the global search; appso: a swarm that does not wait for its slowest particle (Y 2.6.2)"
+    )
+    staged: bool = key(
+        False, "search elastic, hardening and damage parameters one group after the other first, then all (Y 5.2)"
+    )
+    swarm: SwarmTable = key(SwarmTable(), "budget of the global search")
     refine: RefineTable = key(RefineTable(), "the local search")
     cross_validation: bool = key(False, "fit again without each curve in turn and predict it")
     correlation_length: int = key(
         5, "points along a curve over which residuals are taken as correlated, for the standard errors", ge=0
     )
-    workers: int = key(1, "threads; the numbers do not depend on it", ge=1, le=1024)
+    workers: int = key(1, "threads (appso: processes); the numbers do not depend on it", ge=1, le=1024)
     csv: CsvFormat = key(CsvFormat(), "how to read CSV")
 
     @model_validator(mode="after")
@@ -152,6 +169,23 @@ class CalibrateScene(Scene):
             faults.append(f"free.{name}.initial = {free.initial!r}: expected from {free.lower!r} to {free.upper!r}")
         if free.scale == "log" and numbers["lower"] <= 0.0:
             faults.append(f"free.{name}.lower = {free.lower!r}: expected above zero on a log scale")
+        return faults or self._prior_faults(name, free, numbers["lower"], numbers["upper"])
+
+    def _prior_faults(self, name: str, free: Free, lower: float, upper: float) -> list[str]:
+        if free.prior is None:
+            return []
+        faults = []
+        for part in ("mean", "deviation"):
+            value = getattr(free.prior, part)
+            try:
+                number = parameter_to_si(self.law, name, value)
+            except ValueError as error:
+                faults.append(f"free.{name}.prior.{part} = {value!r}: expected {error}")
+                continue
+            if part == "mean" and not lower <= number <= upper:
+                faults.append(f"free.{name}.prior.mean = {value!r}: expected from {free.lower!r} to {free.upper!r}")
+            if part == "deviation" and number <= 0.0:
+                faults.append(f"free.{name}.prior.deviation = {value!r}: expected above zero")
         return faults
 
     def _numbers(self) -> list[str]:
@@ -160,6 +194,14 @@ class CalibrateScene(Scene):
     def fixed_si(self) -> dict[str, Any]:
         """The fixed parameters in SI."""
         return {n: parameter_to_si(self.law, n, v) for n, v in self.fixed.items()}
+
+    def priors_si(self) -> dict[str, tuple[float, float]]:
+        """Mean and standard deviation in SI of the parameters that have a prior."""
+        return {
+            n: (parameter_to_si(self.law, n, f.prior.mean), parameter_to_si(self.law, n, f.prior.deviation))
+            for n, f in self.free.items()
+            if f.prior is not None
+        }
 
     def bounds_si(self) -> tuple[list[str], list[float], list[float], list[bool], list[float | None]]:
         """Names, lower, upper, log flags and initial values of the free parameters, in SI."""

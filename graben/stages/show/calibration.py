@@ -9,12 +9,16 @@ import numpy as np
 
 def draw(dataset: Any, figure: Any) -> None:
     """Fill a matplotlib figure from an artifact of kind "calibration". Compression is shown positive."""
-    figure.set_size_inches(13.0, 9.0)
-    grid = figure.add_gridspec(2, 3, width_ratios=(1.15, 1.15, 1.0))
+    compared = "candidate_name" in dataset
+    figure.set_size_inches(13.0, 12.0 if compared else 9.0)
+    rows = (1.0, 1.0, 0.6) if compared else (1.0, 1.0)
+    grid = figure.add_gridspec(len(rows), 3, width_ratios=(1.15, 1.15, 1.0), height_ratios=rows)
     _curves(dataset, figure.add_subplot(grid[0, :2]), lateral=False)
     _curves(dataset, figure.add_subplot(grid[1, :2]), lateral=True)
     _parameters(dataset, figure.add_subplot(grid[0, 2]))
     _correlation(dataset, figure.add_subplot(grid[1, 2]), figure)
+    if compared:
+        _candidates(dataset, figure.add_subplot(grid[2, :]))
     rmse = float(dataset.attrs["rmse_pa"]) / 1e6
     figure.suptitle(f"{dataset.attrs['law']}: RMSE of axial stress {rmse:.3f} MPa", fontsize=12)
 
@@ -95,3 +99,31 @@ def _correlation(data: Any, axes: Any, figure: Any) -> None:
     axes.set_yticks(range(len(names)), names, fontsize=6)
     axes.set_title("correlation (blank: held by a bound)", fontsize=9)
     figure.colorbar(image, ax=axes, shrink=0.7)
+
+
+def _candidates(data: Any, axes: Any) -> None:
+    """Each law's error where it was fitted, where it was not, and on each curve held out."""
+    fitted, holdout = data["candidate_rmse"].values / 1e6, data["candidate_holdout_rmse"].values / 1e6
+    names = [
+        f"{name}\n{law}, {count} free"
+        for name, law, count in zip(*(data[f"candidate_{k}"].values for k in ("name", "law", "parameters")))
+    ]
+    rows = np.arange(len(names))
+    held = np.isfinite(holdout).any(axis=0)
+    pooled = np.sqrt(np.mean(holdout[:, held] ** 2, axis=1))
+    axes.barh(rows - 0.18, fitted, 0.34, color="0.85", label="fitted to all curves")
+    axes.barh(rows + 0.18, pooled, 0.34, color="0.6", label="cross-validated")
+    for i in np.flatnonzero(held):
+        axes.plot(
+            holdout[:, i],
+            rows + 0.18,
+            "o",
+            ms=4,
+            color=f"C{i % 10}",
+            label=f"{data['curve_name'].values[i]} held out",
+        )
+    axes.set_yticks(rows, names, fontsize=8)
+    axes.invert_yaxis()
+    axes.set_xlabel("RMSE of axial stress, MPa")
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.3, axis="x")

@@ -1,0 +1,147 @@
+"""What a calibration hands back: the arrays of its artifact, the headline numbers, the note of the material file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from graben.mechanics.materials.laws import LAWS
+from graben.mechanics.search.curves import Curve, CurveFit
+from graben.mechanics.search.identifiability import Identifiability
+from graben.mechanics.search.multistart import Found
+from graben.schemas.scenes.calibrate import CalibrateScene
+from graben.stages.calibrate_compare import Candidate
+from graben.stages.calibrate_problem import Problem
+
+
+def distinct(members: np.ndarray, gap: float = 1e-3) -> np.ndarray:
+    chosen: list[np.ndarray] = []
+    for m in members:
+        if all(np.abs(m - c).max() > gap for c in chosen):
+            chosen.append(m)
+    return np.array(chosen)
+
+
+def arrays_of(
+    problem: Problem, fit: CurveFit, measured: Sequence[Curve], unseen: Sequence[Curve], values: np.ndarray,
+    known: Identifiability, errors: dict[str, Any], holdout: np.ndarray | None, members: np.ndarray, found: Found,
+    candidates: Sequence[Candidate],
+) -> dict[str, Any]:  # fmt: skip
+    box = problem.box
+    law = LAWS[problem.scene.law]
+    every = [*measured, *unseen]
+    whole = problem.fit(every) if unseen else fit
+    steps = max(len(c.stress) for c in every)
+    sets = box.to_values(np.concatenate([box.to_unit(values)[None], members]))
+    predicted = whole.predict(np.concatenate([values[None], sets[1:]]))
+    all_errors = whole.errors(values) if unseen else errors
+    shape = (len(every), steps, 4)
+    data = {n: np.full(shape, np.nan) for n in ("stress_measured", "strain_measured", "stress", "strain")}
+    band = np.full((len(members), len(every), steps), np.nan)
+    for i, c in enumerate(every):
+        r = len(c.stress)
+        data["stress_measured"][i, :r], data["strain_measured"][i, :r] = c.stress, c.strain
+        data["stress"][i, :r], data["strain"][i, :r] = predicted.stress[0, i, :r], predicted.strain[0, i, :r]
+        band[:, i, :r] = predicted.stress[1:, i, :r, 1]
+    slope = box.slope(box.to_unit(values))
+    unit = box.to_unit(values)
+    bound = np.where(unit <= 1e-6, -1, np.where(unit >= 1.0 - 1e-6, 1, 0))
+    out = {
+        "parameter_name": np.array(box.names, dtype=str),
+        "parameter_unit": np.array([law.parameter(n).unit for n in box.names], dtype=str),
+        "value": values,
+        "lower": box.lower,
+        "upper": box.upper,
+        "log_scale": box.log.astype(np.int8),
+        "standard_error": known.robust_error * slope,
+        "standard_error_independent": known.standard_error * slope,
+        "at_bound": bound.astype(np.int8),
+        "identifiable": known.identifiable.astype(np.int8),
+        "covariance": known.covariance,
+        "correlation": known.correlation,
+        "direction": known.directions,
+        "direction_error": np.where(np.isfinite(known.direction_error), known.direction_error, np.nan),
+        "direction_unseen": known.unseen.astype(np.int8),
+        "curve_name": np.array([c.name for c in every], dtype=str),
+        "role": np.array(["fit"] * len(measured) + ["validation"] * len(unseen), dtype=str),
+        "step_count": np.array([len(c.stress) for c in every]),
+        "reached": np.maximum(predicted.reached[0], 0.0),
+        "confining_stress": np.array([c.stress[0, 0] for c in every]),
+        "stress_rmse": all_errors["stress_per_curve"],
+        "strain_rmse": all_errors["strain_per_curve"],
+        **data,
+        "member_value": sets[1:],
+        "member_objective": fit.objective(sets[1:]),
+        "member_stress_rmse": np.array([fit.errors(v)["stress"] for v in sets[1:]]),
+        "member_axial_stress": band,
+        "history": found.history,
+    }
+    if holdout is not None:
+        out["holdout_rmse"] = np.concatenate([holdout, np.full(len(unseen), np.nan)])
+    if candidates:
+        out |= {
+            "candidate_name": np.array([c.name for c in candidates], dtype=str),
+            "candidate_law": np.array([c.law for c in candidates], dtype=str),
+            "candidate_parameters": np.array([c.parameters for c in candidates]),
+            "candidate_rmse": np.array([c.fitted for c in candidates]),
+            "candidate_holdout_rmse": np.array(
+                [np.concatenate([c.holdout, np.full(len(unseen), np.nan)]) for c in candidates]
+            ),
+        }
+    return out
+
+
+def headline_of(
+    scene: CalibrateScene, problem: Problem, measured: Sequence[Curve], unseen: Sequence[Curve],
+    values: np.ndarray, known: Identifiability, errors: dict[str, Any], holdout: np.ndarray | None,
+    arrays: dict[str, Any], candidates: Sequence[Candidate],
+) -> dict[str, Any]:  # fmt: skip
+    names = problem.box.names
+    out: dict[str, Any] = {
+        "law": scene.law,
+        "rmse_pa": errors["stress"],
+        "strain_rmse": errors["strain"],
+        "parameters": {n: float(v) for n, v in zip(names, values)},
+        "standard_errors": {n: _finite(e) for n, e in zip(names, arrays["standard_error"])},
+        "curve_rmse_pa": {c.name: float(e) for c, e in zip(measured, errors["stress_per_curve"])},
+        "incomplete": [c.name for c, ok in zip(measured, errors["complete"]) if not ok],
+        "at_bounds": [n for n, b in zip(names, arrays["at_bound"]) if b],
+        "not_identifiable": [n for n, ok, free in zip(names, known.identifiable, known.free) if free and not ok],
+        "unseen_directions": int(known.unseen.sum()),
+    }
+    if holdout is not None:
+        out["holdout_rmse_pa"] = {c.name: _finite(e) for c, e in zip(measured, holdout)}
+        out["cross_validation_rmse_pa"] = _finite(float(np.sqrt(np.mean(holdout**2))))
+    if candidates:
+        table = sorted(candidates, key=lambda c: c.cross_validated if math.isfinite(c.cross_validated) else math.inf)
+        out["comparison"] = [
+            {
+                "name": c.name,
+                "law": c.law,
+                "parameters": c.parameters,
+                "rmse_pa": c.fitted,
+                "cross_validation_rmse_pa": _finite(c.cross_validated),
+                "worst_holdout_rmse_pa": _finite(float(c.holdout.max())),
+            }
+            for c in table
+        ]
+    if unseen:
+        each = arrays["stress_rmse"][len(measured) :]
+        points = np.array([len(c.stress) for c in unseen])
+        out["validation_rmse_pa"] = float(np.sqrt(np.sum(each**2 * points) / points.sum()))
+        out["validation_curve_rmse_pa"] = {c.name: float(e) for c, e in zip(unseen, each)}
+    return out
+
+
+def _finite(value: float) -> float | None:
+    """JSON has no nan: None where there is no number."""
+    return float(value) if math.isfinite(value) else None
+
+
+def note_of(scene: CalibrateScene, curves: Sequence[Curve], errors: dict[str, Any]) -> str:
+    names = ", ".join(c.name for c in curves)
+    title = scene.title or "calibrate"
+    return f"{title}\nfitted to {names}; axial-stress RMSE {errors['stress'] / 1e6:.4g} MPa"
