@@ -119,3 +119,39 @@ def test_triaxial_control_holds_both_lateral_stresses():
 def test_bad_curves_are_refused(curves, text):
     with pytest.raises(ValueError, match=text):
         CurveFit("elastic", {"poisson_ratio": 0.2}, ["young_modulus"], curves)
+
+
+@pytest.mark.parametrize("last", [0.0, 0.5, 1.0, 3.0])
+def test_no_curve_dominates_by_its_size_its_points_or_the_weights_along_it(last):
+    """Curves of 1 and 100 MPa with 11 and 101 points, all wrong by 10 % of their top: with "curve" each costs the
+    same whatever the weights along it, with "all" as the square of its stress."""
+    curves, tops = [], np.array([1e6, 1e8, 5e6])
+    for top, steps in zip(tops, (11, 11, 101)):
+        strain, stress = np.zeros((steps, 4)), np.zeros((steps, 4))
+        strain[:, 1] = -np.linspace(0.0, 0.9 * top / 1e9, steps)
+        stress[:, 1] = 1e9 * strain[:, 1] - 0.1 * top
+        curves.append(Curve(f"{top:g}", stress, strain, seat="seee"))
+    costs = {}
+    for normalise in ("curve", "all"):
+        weights = Weights(normalise, last=last, strain=0.0)
+        fit = CurveFit("elastic", {"poisson_ratio": 0.0}, ["young_modulus"], curves, weights)
+        r = fit.residuals(np.array([[1e9]]))[0, : fit.points]
+        costs[normalise] = np.array([np.sum(r[fit.groups[: fit.points] == g] ** 2) for g in range(3)])
+    np.testing.assert_allclose(costs["curve"], 0.01 / 3, rtol=1e-9)
+    np.testing.assert_allclose(costs["all"], 0.01 / 3 * (tops / tops.max()) ** 2, rtol=1e-9)
+
+
+def test_lateral_strain_counts_as_its_weight_says_on_every_curve():
+    """Lateral strain that is missed entirely costs weight^2 times what missing the stress would, on every curve."""
+    curves = []
+    for top in (0.01, 0.1):
+        strain, stress = np.zeros((21, 4)), np.zeros((21, 4))
+        strain[:, 1] = -np.linspace(0.0, top, 21)
+        strain[:, 0] = 0.1 * top  # the law answers 0 with nu = 0
+        stress[:, 1] = 1e9 * strain[:, 1]
+        curves.append(Curve(f"{top:g}", stress, strain))
+    weights = Weights("curve", last=0.5, strain=0.3)
+    fit = CurveFit("elastic", {"poisson_ratio": 0.0}, ["young_modulus"], curves, weights)
+    r = fit.residuals(np.array([[1e9]]))[0, : fit.points]
+    costs = np.array([np.sum(r[fit.groups[: fit.points] == g] ** 2) for g in range(4)])
+    np.testing.assert_allclose(costs, [0.0, 0.3**2 / 2, 0.0, 0.3**2 / 2], atol=1e-12)
