@@ -189,6 +189,17 @@ def _arrays(scene: ParticlesScene, law: LinearLaw, beds: list[Bed]) -> dict[str,
         "contact_particle": np.concatenate([b.pair + offset[i] for i, b in enumerate(beds)]),
         "contact_normal": np.concatenate([b.normal for b in beds]),
         "contact_force": np.concatenate([b.push for b in beds]),
+        "bed_periodic": np.full(len(beds), scene.box.sides == "periodic"),
+        "state_contact_count": [[len(b.state_forces[n].pair) for n in names] for b in beds],
+        "state_contact_particle": np.concatenate(
+            [
+                np.where(b.state_forces[n].pair >= 0, b.state_forces[n].pair + offset[i], -1)
+                for i, b in enumerate(beds)
+                for n in names
+            ]
+        ),
+        "state_contact_force": np.concatenate([b.state_forces[n].force for b in beds for n in names]),
+        "state_contact_arm": np.concatenate([b.state_forces[n].arm for b in beds for n in names]),
         "state_name": np.array(names),
         "state_time": np.array([[b.state_times[n] for n in names] for b in beds]),
         "sample_bed": np.repeat(np.arange(len(beds)), [len(b.history) for b in beds]),

@@ -145,3 +145,25 @@ def test_failed_numerics_exit_with_3_and_keep_the_last_good_state(made, tmp_path
     grid = pyvista.read(tmp_path / "out.last-good.vtu")
     assert np.isfinite(grid.points).all() and set(grid.point_data.keys()) == {"radius", "class", "velocity"}
     assert not (tmp_path / "out.nc").exists()
+
+
+def test_saved_contact_forces_hold_every_grain(made):
+    """At rest the contact forces of each grain carry its weight; those of the floor and the last state agree."""
+    bed = read_artifact(made / "bed.nc", "particles")
+    count = bed["state_contact_count"].values
+    ends = np.cumsum(count.ravel()).reshape(count.shape)
+    assert ends[-1, -1] == bed.sizes["force"]
+    last = np.concatenate([np.arange(ends[b, -1] - count[b, -1], ends[b, -1]) for b in range(2)])
+    pair, force = bed["state_contact_particle"].values[last], bed["state_contact_force"].values[last]
+    total = np.zeros((bed.sizes["particle"], 3))
+    np.add.at(total, pair[:, 0], force)
+    np.add.at(total, pair[pair[:, 1] >= 0, 1], -force[pair[:, 1] >= 0])
+    kind, radius = bed["particle_class"].values, bed["particle_radius"].values
+    total[:, 2] -= 9.81 * 4.0 / 3.0 * np.pi * radius**3 * bed["class_density"].values[kind]
+    assert np.abs(total).sum(axis=1).mean() < 0.02 * np.linalg.norm(force, axis=1).mean()
+    spheres = pair[:, 1] >= 0
+    assert np.array_equal(pair[spheres], bed["contact_particle"].values)
+    along = -np.einsum("ij,ij->i", force[spheres], bed["contact_normal"].values)
+    np.testing.assert_allclose(along, bed["contact_force"], rtol=1e-9, atol=1e-18)
+    floor = (~spheres) & (force[:, 2] > 0.0)
+    np.testing.assert_allclose(force[floor, 2].sum(), bed["floor_force"].values.sum(), rtol=1e-12)

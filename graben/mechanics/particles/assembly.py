@@ -40,6 +40,16 @@ class Survey:
         return self.mean_net_force / self.mean_contact_force if self.mean_contact_force > 0.0 else np.inf
 
 
+@dataclass(frozen=True)
+class ContactForces:
+    """pair (m, 2) identities, -1 in the second place for a wall; force (m, 3) N on the first; arm (m, 3) m from the
+    centre of the first to the middle of the overlap (walls: to the wall)."""
+
+    pair: Ints
+    force: Floats
+    arm: Floats
+
+
 class Assembly:
     """Spheres in [0, width_x) x [0, width_y), floor at z = 0, open top or piston.
 
@@ -275,6 +285,35 @@ class Assembly:
             pair, normal, push,
         )  # fmt: skip
         return self.identity[pair[:m]], normal[:m], push[:m]
+
+    def contact_forces(self) -> ContactForces:
+        """All contacts of the present state with spheres and walls, by identity: springs only, friction included."""
+        law, pairs = self.law, self.pairs
+        i = np.repeat(np.arange(self.x.shape[0]), np.diff(self.first))
+        j = self.partner[:pairs].astype(np.int64)
+        branch = self.x[j] - self.x[i]
+        if self.periodic:
+            branch[:, :2] -= self.width * np.rint(branch[:, :2] / self.width)
+        distance = np.sqrt(np.einsum("ij,ij->i", branch, branch))
+        overlap = self.radius[i] + self.radius[j] - distance
+        touch = overlap > 0.0
+        i, j, overlap, shear = i[touch], j[touch], overlap[touch], self.slip[:pairs][touch] if law.rubs else 0.0
+        normal = branch[touch] / distance[touch, None]
+        pair = [np.stack([self.identity[i], self.identity[j]], axis=1)]
+        force = [shear - (law.pair_kn[self.kind[i], self.kind[j]] * overlap)[:, None] * normal]
+        arm = [(self.radius[i] - 0.5 * overlap)[:, None] * normal]
+        walls = range(4 if self.periodic else 0, 6 if self.drive[motion.PISTON_ON] > 0.0 else 5)
+        for w in walls:
+            axis, side = w // 2, 1.0 if w % 2 == 0 else -1.0
+            overlap = self.radius - side * (self.x[:, axis] - self.place[w])
+            i = np.flatnonzero(overlap > 0.0)
+            normal = np.zeros((i.size, 3))
+            normal[:, axis] = -side
+            shear = self.wall_slip[i, w] if law.rubs else 0.0
+            pair.append(np.stack([self.identity[i], np.full(i.size, -1)], axis=1))
+            force.append(shear - (law.wall_kn[self.kind[i]] * overlap[i])[:, None] * normal)
+            arm.append((self.radius[i] - overlap[i])[:, None] * normal)
+        return ContactForces(*(np.concatenate(part) for part in (pair, force, arm)))
 
     def energy(self) -> dict[str, float]:
         """Every entry of the energy balance, J; `total` stays constant when the steps are exact."""

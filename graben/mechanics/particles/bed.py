@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from graben.mechanics.failure import NumericsFailed
 from graben.mechanics.particles import motion
-from graben.mechanics.particles.assembly import Assembly, Survey
+from graben.mechanics.particles.assembly import Assembly, ContactForces, Survey
 from graben.mechanics.particles.insertion import insert
 from graben.mechanics.particles.law import LinearLaw
 
@@ -63,7 +63,8 @@ class BedRecipe:
 class Bed:
     """A pressed and quenched bed. Arrays run over particles in the order of insertion.
 
-    history holds one row per sample (columns HISTORY); states the positions (n, 3) at the end of each phase.
+    history holds one row per sample (columns HISTORY); states the positions (n, 3) at the end of each phase, and
+    state_forces the contacts there.
     """
 
     radius: Floats
@@ -79,6 +80,7 @@ class Bed:
     history: Floats
     states: dict[str, Floats] = field(default_factory=dict)
     state_times: dict[str, float] = field(default_factory=dict)
+    state_forces: dict[str, ContactForces] = field(default_factory=dict)
     area: float = 0.0
     piston_height: float = 0.0
     solid_fraction: float = 0.0
@@ -146,6 +148,7 @@ class _Run:
         self.rows: list[list[float]] = []
         self.states = {"inserted": position.copy()}
         self.times = {"inserted": 0.0}
+        self.forces = {"inserted": self.box.contact_forces()}
         self.reference = self.box.energy()["total"]
         self.energy_scale = abs(self.box.energy()["potential"])
         self.energy_error = 0.0
@@ -202,6 +205,7 @@ class _Run:
                 )  # fmt: skip
         self.states[phase] = self.box.by_identity(self.box.x)
         self.times[phase] = self.box.time
+        self.forces[phase] = self.box.contact_forces()
 
 
 def make_bed(
@@ -284,6 +288,7 @@ def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
         history=np.array(run.rows),
         states=run.states,
         state_times=run.times,
+        state_forces=run.forces,
         area=run.area,
         piston_height=height,
         solid_fraction=run.volume / (run.area * height),

@@ -23,6 +23,7 @@ LAYOUT = Layout(
         "state": "ends of the phases: inserted, settled, shaken (if asked), pressed, quenched",
         "sample": "rows of the history of all beds",
         "side": "first and second sphere of a contact",
+        "force": "contacts with spheres and walls of each bed at each state: state_contact_count of each",
         "axis": "x, y, z (z is up, the floor is z = 0)",
     },
     variables={
@@ -55,6 +56,19 @@ LAYOUT = Layout(
         "contact_force": Variable(_C, "N", "normal force, positive: push"),
         "state_name": Variable(("state",), "1", "name of the phase", dtype="U"),
         "state_time": Variable(("bed", "state"), "s", "time at the end of the phase"),
+        "bed_periodic": Variable(_B, "1", "1 where the sides repeat", dtype="i1", optional=True),
+        "state_contact_count": Variable(
+            ("bed", "state"), "1", "entries of dim force, bed by bed and state by state", dtype="i8", optional=True
+        ),
+        "state_contact_particle": Variable(
+            ("force", "side"), "1", "indices of the two spheres (-1: a wall)", dtype="i8", optional=True
+        ),
+        "state_contact_force": Variable(
+            ("force", "axis"), "N", "force on the first sphere, friction included, dashpots not", optional=True
+        ),
+        "state_contact_arm": Variable(
+            ("force", "axis"), "m", "from the centre of the first sphere to the contact", optional=True
+        ),
         "sample_bed": Variable(_S, "1", "index of the bed", dtype="i8"),
         "time": Variable(_S, "s", "time"),
         "kinetic": _energy("kinetic energy of grains and piston"),
