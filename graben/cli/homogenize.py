@@ -1,4 +1,4 @@
-"""homogenize: average a run of blocks over a representative area."""
+"""homogenize: average a run of blocks over a representative area, or a bed of spheres over a ball."""
 
 from __future__ import annotations
 
@@ -28,10 +28,18 @@ def _point(text: str, option: str) -> tuple[float, float]:
     return _length(parts[0], option), _length(parts[1], option)
 
 
+def _centre(text: str) -> tuple[float, ...]:
+    if text.count(",") == 2:
+        return tuple(_length(part, "--centre") for part in text.split(","))
+    return _point(text, "--centre")
+
+
 @click.command("homogenize", cls=Tool)
 @click.argument("inputs", nargs=-1, required=True, type=FILE, metavar="DEM.nc...")
 @click.option("--radius", "radii", multiple=True, metavar="LENGTH", help='Radius of the REV, "4 m" (repeatable).')
-@click.option("--centre", metavar="X,Y", help='Its centre, "5 m, 5 m"; the middle of the model unless given.')
+@click.option(
+    "--centre", metavar="X,Y[,Z]", help='Its centre, "5 m, 5 m" (spheres: x, y, z); the middle unless given.'
+)
 @click.option("--polygon", metavar="X,Y;...", help='A polygon instead: "1 m,1 m; 9 m,1 m; 9 m,9 m".')
 @click.option("--deformed", is_flag=True, help="Measure area and strain in the outline's current shape.")
 @click.option("--chosen-at", type=int, default=0, help="Saved state at which blocks meet the REV (0: the first).")
@@ -51,7 +59,7 @@ def main(
     output: Path,
     overwrite: bool,
 ) -> None:
-    """Average stress and strain of runs of blocks over representative areas.
+    """Average stress and strain of runs of blocks over representative areas, or of beds of spheres over balls.
 
     Several inputs, or radii, become several paths of one artifact of curves, in the order given.
     """
@@ -63,7 +71,7 @@ def main(
             inputs,
             output,
             radii=[_length(r, "--radius") for r in radii],
-            centre=_point(centre, "--centre") if centre else None,
+            centre=_centre(centre) if centre else None,
             polygon=corners,
             deformed=deformed,
             chosen_at=chosen_at,

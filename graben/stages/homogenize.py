@@ -44,7 +44,7 @@ def run(
     output: Path,
     *,
     radii: Sequence[float] = (),
-    centre: Point | None = None,
+    centre: Sequence[float] | None = None,
     polygon: Sequence[Point] = (),
     deformed: bool = False,
     chosen_at: int = 0,
@@ -57,10 +57,10 @@ def run(
 
     Parameters
     ----------
-    inputs : artifacts of kind "blocks"
+    inputs : artifacts of kind "blocks", or all of kind "particles" (see `homogenize_spheres`)
     output : artifact of kind "curves"
     radii : m, of circles; or `polygon`, corners in m
-    centre : m, of the circles; the middle of each model unless given
+    centre : m, of the circles (x, y), or balls (x, y, z); the middle of each model unless given
     deformed : measure area and strain in the current shape of the outline
     chosen_at : saved state at which blocks are said to meet the REV (0: the first)
     steps_picture : also draw the nine steps of Y 2.3 for the first path
@@ -79,7 +79,12 @@ def run(
     for target in (output, steps_picture):
         if target is not None:
             refuse_existing(target, overwrite)
-    record = Record.begin(None, inputs=_existing(inputs))
+    kinds = [_kind(path) for path in _existing(inputs)]
+    if "particles" in kinds:
+        return _spheres(inputs, kinds, output, radii, centre, deformed, chosen_at, steps_picture or vtk, progress)
+    if centre is not None and len(centre) != 2:
+        raise BadInput(Fault("homogenize", "--centre", f"{len(centre)} lengths", "x, y for blocks"))
+    record = Record.begin(None, inputs=inputs)
     jobs, faults = _jobs(inputs, radii, centre, polygon, chosen_at, progress)
     if faults:
         raise BadInput(faults)
@@ -106,6 +111,47 @@ def run(
     return {"paths": [_headline(str(arrays["path_name"][k]), j, a) for k, (j, a) in enumerate(zip(jobs, averages))]}
 
 
+def _kind(path: Path) -> str:
+    """Kind of an artifact; "" where it cannot be told (reading it will say why)."""
+    import xarray
+
+    try:
+        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as data:
+            return str(data.attrs.get("schema_kind", ""))
+    except (OSError, ValueError, RuntimeError):
+        return ""
+
+
+def _spheres(
+    inputs: Sequence[Path],
+    kinds: Sequence[str],
+    output: Path,
+    radii: Sequence[float],
+    centre: Sequence[float] | None,
+    deformed: bool,
+    chosen_at: int,
+    pictures: Any,
+    progress: Progress,
+) -> dict[str, Any]:
+    from graben.stages import homogenize_spheres
+
+    faults = [
+        Fault(str(path), "schema_kind", repr(kind), "'particles', as the others")
+        for path, kind in zip(inputs, kinds)
+        if kind != "particles"
+    ]
+    if not radii:
+        faults.append(Fault("homogenize", "--polygon", "", "a radius: spheres are averaged over balls"))
+    if deformed or pictures:
+        option = "--deformed" if deformed else "--steps, --vtk"
+        faults.append(Fault("homogenize", option, "", "blocks: spheres have no outline, and a ball goes with them"))
+    if centre is not None and len(centre) != 3:
+        faults.append(Fault("homogenize", "--centre", f"{len(centre)} lengths", "x, y, z for spheres"))
+    if faults:
+        raise BadInput(faults)
+    return homogenize_spheres.run(inputs, output, radii=radii, centre=centre, chosen_at=chosen_at, progress=progress)
+
+
 def _existing(inputs: Sequence[Path]) -> list[Path]:
     missing = [Fault(str(p), "", "", "an existing artifact file") for p in inputs if not p.is_file()]
     if missing:
@@ -116,7 +162,7 @@ def _existing(inputs: Sequence[Path]) -> list[Path]:
 def _jobs(
     inputs: Sequence[Path],
     radii: Sequence[float],
-    centre: Point | None,
+    centre: Sequence[float] | None,
     polygon: Sequence[Point],
     chosen_at: int,
     progress: Progress,
@@ -136,7 +182,7 @@ def _jobs(
             faults.append(Fault(str(path), "--chosen-at", str(chosen_at), f"a saved state, 0 to {states - 1}"))
             continue
         try:
-            revs: list[Rev] = [Circle(centre or source.middle, r) for r in radii]
+            revs: list[Rev] = [Circle((centre[0], centre[1]) if centre else source.middle, r) for r in radii]
             if polygon:
                 revs.append(Polygon(tuple(polygon)))
         except ValueError as error:
