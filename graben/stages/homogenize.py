@@ -100,7 +100,12 @@ def run(
         "force_imbalance": max(float(a.force_imbalance.max()) for a in averages),
         "boundary_stress_difference": max(_boundary_difference(a) for a in averages),
     }
-    attributes = {"configuration": "deformed" if deformed else "reference", "outline_chosen_at": chosen_at}
+    rigid = any(not j.history.zoned[a.outline.blocks].all() for (j, _), a in zip(jobs, averages))
+    attributes = {
+        "configuration": "deformed" if deformed else "reference",
+        "outline_chosen_at": chosen_at,
+        "stress_from": "zones, and the forces on blocks without zones" if rigid else "zones",
+    }
     write_artifact(output, LAYOUT, arrays, record, attributes)
     if steps_picture is not None:
         from graben.stages.show.outline_steps import save_steps
@@ -254,8 +259,9 @@ def _write_vtk(output: Path, jobs: Sequence[tuple[Run, Rev]], averages: Sequence
 
 def _boundary_difference(a: Average) -> float:
     """Largest difference between zone and boundary-force stress, over the largest stress."""
-    largest = float(np.abs(a.stress).max())
-    return float(np.abs(a.stress - a.stress_boundary).max()) / largest if largest > 0.0 else 0.0
+    # nan: zz of blocks without zones
+    largest = float(np.nanmax(np.abs(a.stress)))
+    return float(np.nanmax(np.abs(a.stress - a.stress_boundary))) / largest if largest > 0.0 else 0.0
 
 
 def _headline(name: str, job: tuple[Run, Rev], a: Average) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.mechanics.averaging import rigid
 from graben.mechanics.averaging.joints import fabric, joint_statistics
 from graben.mechanics.averaging.network import Network, build_network
 from graben.mechanics.averaging.outline import Outline, domain_outline, find_outline, outline_area
@@ -98,6 +99,13 @@ class History:
         return block_motion(self.current, self.velocity, self.vertex_block, self.corner_count.size)
 
     @cached_property
+    def zoned(self) -> NDArray[np.bool_]:
+        """(block,) true for blocks that have zones; the stress of the others comes from the forces on them."""
+        flags = np.zeros(self.corner_count.size, dtype=bool)
+        flags[self.zone_block] = True
+        return flags
+
+    @cached_property
     def domain(self) -> Floats:
         """(n, 2) m outline of the whole model at the first state."""
         return domain_outline(self.network)
@@ -160,14 +168,29 @@ def average(history: History, rev: Rev, deformed: bool = False, chosen_at: int =
     current_areas = zone_areas(history.current, inner_zones)
     stress = zone_average(history.zone_stress[:, within], current_areas if deformed else first_areas, measure)
 
+    solid = current_areas.sum(axis=1)
+    c = history.contacts
+    bare = outline.blocks & ~history.zoned
+    if bare.any():
+        moment = rigid.force_moment(
+            bare, history.motion[0], c.state, c.block, c.position, c.force,
+            history.vertex_block, history.current, history.vertex_force,
+        ) / np.broadcast_to(measure, (count,))[:, None, None]  # fmt: skip
+        stress[:, 0] += moment[:, 0, 0]
+        stress[:, 1] += moment[:, 1, 1]
+        stress[:, 3] += 0.5 * (moment[:, 0, 1] + moment[:, 1, 0])
+        stress[:, 2] = np.nan  # forces in the plane say nothing about it
+        solid = solid + rigid.outline_areas(network, history.current, bare)
+
     # The parts of the strain are those of the first state: there the network's joints are shut.
     shift = history.displacement - u[:, :1]
     in_blocks = zone_gradient(history.position, shift, history.zone_vertex, within) / area
+    if bare.any():
+        in_blocks = in_blocks + rigid.outline_gradients(network, history.position, shift, bare) / area
     in_joints = joint_gradient(network, outline, shift) / area
     whole = outline_gradient(x, u)
     closure = float(np.abs(whole - in_blocks - in_joints).max())
 
-    c = history.contacts
     forces = forces_on(
         outline.blocks,
         c.state,
@@ -201,7 +224,7 @@ def average(history: History, rev: Rev, deformed: bool = False, chosen_at: int =
         strain_joints=strain_of(in_joints),
         rotation=rotation_of(gradient),
         current_area=current_area,
-        solid_fraction=current_areas.sum(axis=1) / current_area,
+        solid_fraction=solid / current_area,
         stress_boundary=stress_boundary,
         force_imbalance=resultant,
         moment_imbalance=skew,
