@@ -10,13 +10,16 @@ import numpy as np
 from graben.mechanics.blocks import snapshot
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.history import History
+from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets
 from graben.mechanics.blocks.joints import Joint
+from graben.mechanics.blocks.mending import mend
 from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.blocks.tessellation import Tessellation, voronoi_blocks, without
 from graben.mechanics.failure import NumericsFailed
 from graben.schemas.artifact import write_artifact
 from graben.schemas.faults import BadInput, Fault
 from graben.schemas.layouts.blocks import LAYOUT
+from graben.schemas.polygon_file import read_polygons
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.stages import blocks_checkpoint
 from graben.stages.blocks_biaxial import Biaxial
@@ -26,6 +29,9 @@ from graben.stages.record import Progress, Record, silent
 
 # Steps of loading for each fidelity; their measured trade is in docs/dem-run-blocks.md
 FIDELITY = {"draft": 12_500, "standard": 50_000, "reference": 200_000}
+
+# Slivers of given or cut blocks are mended below this share of tessellation.edge.
+_MENDED = 0.1
 
 
 def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Progress = silent) -> dict[str, Any]:
@@ -115,7 +121,16 @@ def _bring_back(path: Path, model: BlockModel, test: Biaxial | Rising, parts: di
 def _tessellation(scene: BlocksScene) -> Tessellation:
     t = scene.tessellation
     outline = np.array(scene.domain.corners)
-    blocks = voronoi_blocks(outline, t.edge, scene.seed, t.lloyd_passes, t.shortest_edge)
+    if t.method == "voronoi":
+        blocks = voronoi_blocks(outline, t.edge, scene.seed, t.lloyd_passes, t.shortest_edge)
+    else:
+        if t.file is not None and t.method == "file":
+            shapes = read_polygons(t.file)
+        else:
+            sets = [JointSet(s.dip, s.spacing, s.persistence, s.dip_scatter, s.spacing_scatter) for s in t.sets]
+            shapes = cut_by_sets(outline, sets, scene.seed)
+        limits = [_MENDED * t.edge if given is None else given for given in (t.shortest_edge, t.thinnest)]
+        blocks = mend(shapes, shortest=limits[0], thinnest=limits[1])
     return without(blocks, [np.array(hole) for hole in scene.domain.holes])
 
 

@@ -119,7 +119,7 @@ def without(tessellation: Tessellation, holes: list[np.ndarray]) -> Tessellation
     if gone.all():
         raise ValueError("holes: no block is left")
     rings = [corner[a:b].tolist() for k, (a, b) in enumerate(itertools.pairwise(start)) if not gone[k]]
-    return _from_rings(points, rings, tessellation.outline)
+    return from_rings(points, rings, tessellation.outline)
 
 
 def _random_points(outline: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
@@ -161,23 +161,38 @@ def _cells(seeds: np.ndarray, outline: np.ndarray):
 
 def _conforming(points, start, corner, outline, check: bool = True) -> Tessellation:
     """Give equal points one number, and drop repeated corners."""
-    tolerance = 1e-7 * float(np.ptp(outline, axis=0).max())
-    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
-    n = len(points)
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    _, label = connected_components(graph, directed=False)
-    _, first, number = np.unique(label, return_index=True, return_inverse=True)
+    number, first = _equal_points(points, 1e-7 * float(np.ptp(outline, axis=0).max()))
     rings = [_without_repeats(number[corner[a:b]].tolist()) for a, b in itertools.pairwise(start)]
     if check and min(len(r) for r in rings) < 3:
         raise ValueError("tessellation: a block has fewer than three corners")
-    return _from_rings(points[first], rings, outline)
+    return from_rings(points[first], rings, outline)
 
 
 def _without_repeats(ring: list[int]) -> list[int]:
     return [p for k, p in enumerate(ring) if p != ring[k - 1]]
 
 
-def _from_rings(points: np.ndarray, rings: list[list[int]], outline: np.ndarray) -> Tessellation:
+def shared_points(shapes: list[np.ndarray]) -> tuple[np.ndarray, list[list[int]]]:
+    """Points (p, 2) of polygons (m, 2), equal ones once, and each polygon's corners as numbers of points."""
+    points = np.vstack(shapes)
+    tolerance = 1e-7 * float(np.ptp(points, axis=0).max())
+    number, first = _equal_points(points, tolerance)
+    ends = np.cumsum([len(s) for s in shapes])[:-1]
+    return points[first], [_without_repeats(r.tolist()) for r in np.split(number, ends)]
+
+
+def _equal_points(points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """The number of each point among the different ones, and the first of each of these."""
+    pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
+    n = len(points)
+    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    _, label = connected_components(graph, directed=False)
+    _, first, number = np.unique(label, return_index=True, return_inverse=True)
+    return number, first
+
+
+def from_rings(points: np.ndarray, rings: list[list[int]], outline: np.ndarray) -> Tessellation:
+    """A tessellation of rings of point numbers; points that no ring uses are dropped."""
     used = np.unique(np.concatenate([np.array(r) for r in rings]))
     renumber = np.full(len(points), -1)
     renumber[used] = np.arange(len(used))
@@ -244,7 +259,7 @@ def collapse_short_edges(tessellation: Tessellation, shortest: float) -> Tessell
             k = ring.index(i)
             push(i, ring[k - 1])
             push(i, ring[(k + 1) % len(ring)])
-    return _from_rings(points, rings, outline)
+    return from_rings(points, rings, outline)
 
 
 def _joined(rings, blocks_at, i: int, j: int) -> bool:

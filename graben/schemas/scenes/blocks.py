@@ -18,7 +18,7 @@ from graben.schemas.quantities import (
     Time,
     key,
 )
-from graben.schemas.scene import Model, Scene
+from graben.schemas.scene import InputFile, Model, Scene
 
 Point = tuple[Length, Length]
 
@@ -54,12 +54,42 @@ class Domain(Model):
         return min(max(c[k] for c in self.corners) - min(c[k] for c in self.corners) for k in (0, 1))
 
 
-class Tessellation(Model):
-    """Voronoi blocks; the defaults give the block statistics of UDEC's generator."""
+class JointSet(Model):
+    """Parallel joints; sets cut the domain one after the other, in the order given."""
 
-    edge: Length = key("0.5 m", "nominal edge; a block has 0.955 times its square as mean area", gt=0)
+    dip: Angle = key(..., "angle of the joints from the x axis, counter-clockwise")
+    spacing: Length = key(..., "mean distance between joints", gt=0)
+    persistence: float = key(1.0, "probability that a block which a joint crosses is cut by it", ge=0, le=1)
+    dip_scatter: Angle = key("0 deg", "standard deviation of the angle of each joint", ge=0)
+    spacing_scatter: float = key(0.0, "standard deviation of each distance, over the spacing", ge=0, le=1)
+
+
+class Tessellation(Model):
+    """The blocks; the defaults are Voronoi blocks with the statistics of UDEC's generator."""
+
+    method: Literal["voronoi", "joint-sets", "file"] = key(
+        "voronoi",
+        "voronoi: random blocks of one size; joint-sets: cut by sets of parallel joints; file: polygons given",
+    )
+    sets: list[JointSet] = key([], "joint-sets: the sets of joints (repeatable)")
+    file: InputFile | None = key(
+        None, "file: polygons that fill the domain, in m, as GeoJSON or the cells of any mesh that meshio reads"
+    )
+    edge: Length = key(
+        "0.5 m",
+        "nominal edge; a Voronoi block has 0.955 times its square as mean area; other limits scale with it",
+        gt=0,
+    )
     lloyd_passes: int = key(4, "passes that even out the blocks", ge=0, le=1000)
-    shortest_edge: Length | None = key(None, "shorter edges are collapsed; left out: 0.48 of the edge", ge=0)
+    shortest_edge: Length | None = key(
+        None, "shorter edges are collapsed; left out: 0.48 of the edge (voronoi), 0.1 of it (others)", ge=0
+    )
+    thinnest: Length | None = key(
+        None,
+        "joint-sets and file: blocks whose area over their longest diagonal is less join the neighbour with the "
+        "longest common edge; left out: 0.1 of the edge",
+        ge=0,
+    )
     rounding: Length = key("0.05 m", "corners are cut off at this distance from them, along both edges", gt=0)
     zone_edge: Length | None = key(None, "longest zone edge; left out: zones span the block corners only", gt=0)
 
@@ -179,6 +209,10 @@ class BlocksScene(Scene):
         t, d = self.tessellation, self.domain
         if t.edge > 0.5 * d.smallest_side:
             faults.append(f"tessellation.edge of at most half the domain (found {t.edge:.4g} m)")
+        if t.method == "file" and t.file is None:
+            faults.append('tessellation.file, because method = "file"')
+        if t.method == "joint-sets" and not t.sets:
+            faults.append('at least one [[tessellation.sets]], because method = "joint-sets"')
         if t.rounding > 0.25 * t.edge:
             faults.append(f"tessellation.rounding of at most a quarter of the edge (found {t.rounding:.4g} m)")
         if t.shortest_edge is not None and t.shortest_edge > t.edge:

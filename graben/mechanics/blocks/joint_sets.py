@@ -1,0 +1,90 @@
+"""Blocks cut out of a polygon by sets of joints: parallel lines with spacing, scatter and persistence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from graben.mechanics.blocks import polygons
+
+
+@dataclass(frozen=True)
+class JointSet:
+    """One set of joints.
+
+    dip : angle of the lines from the x axis, counter-clockwise [rad]; spacing : mean distance [m]
+    dip_scatter : standard deviation of each line's angle [rad]; spacing_scatter : of each distance, over the spacing
+    persistence : probability that a block which a line crosses is cut by it. A joint that ends inside a block would
+    carry nothing between blocks, so it goes through or is left out.
+    """
+
+    dip: float
+    spacing: float
+    persistence: float = 1.0
+    dip_scatter: float = 0.0
+    spacing_scatter: float = 0.0
+
+
+def cut_by_sets(outline: np.ndarray, sets: list[JointSet], seed: int) -> list[np.ndarray]:
+    """Blocks (m, 2) counter-clockwise that the joints of all sets, one set after the other, leave of the outline."""
+    rng = np.random.Generator(np.random.PCG64(seed))
+    outline = np.asarray(outline, dtype=float)
+    blocks = [outline if polygons.signed_area(outline) > 0.0 else outline[::-1].copy()]
+    for joints in sets:
+        for point, direction in _lines(outline, joints, rng):
+            left = []
+            for block in blocks:
+                pieces = split(block, point, direction)
+                # One draw for each block that is crossed, whatever the persistence.
+                crossed = len(pieces) > 1
+                left += pieces if crossed and rng.random() < joints.persistence else [block]
+            blocks = left
+    return blocks
+
+
+def _lines(outline: np.ndarray, joints: JointSet, rng: np.random.Generator):
+    """A point and a unit direction of every line of a set that may cross the outline."""
+    centre = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
+    reach = 0.5 * float(np.hypot(*np.ptp(outline, axis=0)))
+    normal = np.array([-np.sin(joints.dip), np.cos(joints.dip)])
+    at = -reach + joints.spacing * rng.random()
+    while at < reach:
+        angle = joints.dip + joints.dip_scatter * rng.standard_normal()
+        yield centre + at * normal, np.array([np.cos(angle), np.sin(angle)])
+        # A tenth of the spacing at least: lines that nearly coincide make slivers only.
+        at += joints.spacing * max(0.1, 1.0 + joints.spacing_scatter * rng.standard_normal())
+
+
+def split(ring: np.ndarray, point: np.ndarray, direction: np.ndarray) -> list[np.ndarray]:
+    """The pieces of a simple polygon (m, 2) on both sides of a line; [ring] where the line misses it."""
+    r = ring - point
+    side = direction[0] * r[:, 1] - direction[1] * r[:, 0]
+    # A corner on the line counts as above it, by a hair.
+    size = float(np.ptp(ring, axis=0).max())
+    side = np.where(np.abs(side) < 1e-9 * size, 1e-9 * size, side)
+    return [p for p in _split(ring, side, point, direction) if abs(polygons.signed_area(p)) > 1e-12 * size**2]
+
+
+def _split(ring, side, point, direction) -> list[np.ndarray]:
+    following = np.roll(side, -1)
+    crossed = np.flatnonzero((side > 0.0) != (following > 0.0))
+    if len(crossed) == 0:
+        return [ring]
+    f = side[crossed] / (side[crossed] - following[crossed])
+    at = ring[crossed] + f[:, None] * (np.roll(ring, -1, axis=0)[crossed] - ring[crossed])
+    # The line enters at its first crossing and leaves at the second: a chord, which parts the polygon in two.
+    order = np.argsort((at - point) @ direction, kind="stable")[:2]
+    first, second = sorted(order.tolist())
+    i, j = int(crossed[first]), int(crossed[second])
+    p, q = at[first], at[second]
+    pieces = []
+    for inner, inner_side, ends in (
+        (ring[i + 1 : j + 1], side[i + 1 : j + 1], (p, q)),
+        (np.vstack([ring[j + 1 :], ring[: i + 1]]), np.concatenate([side[j + 1 :], side[: i + 1]]), (q, p)),
+    ):
+        whole = np.vstack([ends[0], inner, ends[1]])
+        # The ends lie on the line: each goes with its neighbour, so this chord is not found again.
+        sides = np.concatenate([inner_side[:1], inner_side, inner_side[-1:]])
+        pieces += _split(whole, sides, point, direction)
+    return pieces

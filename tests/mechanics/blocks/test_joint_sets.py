@@ -1,0 +1,94 @@
+"""Blocks from joint sets and from given polygons: they fill the domain, and slivers go by the stated rule."""
+
+import numpy as np
+import pytest
+
+from graben.mechanics.blocks import polygons
+from graben.mechanics.blocks.bodies import build_bodies
+from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets, split
+from graben.mechanics.blocks.mending import mend
+
+SLOPE = np.array([(0, 0), (8, 0), (8, 5), (4, 5), (3, 2), (0, 2)], dtype=float)
+COMB = np.array(
+    [(0, 0), (5, 0), (5, 3), (4, 3), (4, 1), (3, 1), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)], float
+)
+
+
+def area(shapes):
+    return sum(polygons.signed_area(s) for s in shapes)
+
+
+def test_a_line_parts_a_comb_in_all_its_teeth():
+    pieces = split(COMB, np.array([0.0, 2.0]), np.array([1.0, 0.0]))
+    assert len(pieces) == 4
+    assert area(pieces) == pytest.approx(polygons.signed_area(COMB), rel=1e-12)
+    assert sorted(round(polygons.signed_area(p), 9) for p in pieces)[:3] == [1.0, 1.0, 1.0]
+    # Through a corner, along a side, beside it.
+    assert len(split(COMB, np.array([0.0, 0.0]), np.array([1.0, 0.0]))) == 1
+    assert area(split(COMB, np.array([0.0, 1.0]), np.array([1.0, 0.0]))) == pytest.approx(area([COMB]))
+    assert area(split(COMB, np.array([0.0, 0.0]), np.array([0.6, 0.8]))) == pytest.approx(area([COMB]))
+
+
+def test_two_sets_across_each_other_give_bricks():
+    square = np.array([(0, 0), (4, 0), (4, 4), (0, 4)], dtype=float)
+    shapes = cut_by_sets(square, [JointSet(0.0, 1.0), JointSet(np.pi / 2, 0.5)], seed=1)
+    assert area(shapes) == pytest.approx(16.0)
+    sizes = np.array([np.ptp(s, axis=0) for s in shapes])
+    inner = np.all(np.isclose(sizes, [0.5, 1.0]), axis=1)
+    assert inner.sum() == 3 * 7
+    blocks = mend(shapes, shortest=0.0, thinnest=0.0, smallest=0.0)
+    assert blocks.size == len(shapes)
+    assert np.allclose(sorted(map(tuple, blocks.outline)), sorted(map(tuple, square)))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_scattered_sets_are_mended_into_sound_blocks(seed):
+    sets = [
+        JointSet(np.radians(20), 0.6, 0.8, np.radians(6), 0.4),
+        JointSet(np.radians(-65), 0.7, 0.6, np.radians(10), 0.4),
+    ]
+    shapes = cut_by_sets(SLOPE, sets, seed)
+    assert area(shapes) == pytest.approx(polygons.signed_area(SLOPE), rel=1e-9)
+    blocks = mend(shapes, shortest=0.15, thinnest=0.08)
+    found, _ = polygons.areas_and_centroids(blocks.points, blocks.start, blocks.corner)
+    # Corners that a collapse moved were inside or moved along the outline.
+    assert found.sum() == pytest.approx(polygons.signed_area(SLOPE), rel=1e-6)
+    assert found.min() > 0.015 * np.median([polygons.signed_area(s) for s in shapes])
+    assert blocks.size > 20
+    bodies = build_bodies(blocks)
+    assert bodies.block_area.sum() == pytest.approx(polygons.signed_area(SLOPE), rel=1e-6)
+    # The outline is the domain's, straight sides in one piece.
+    assert np.allclose(sorted(map(tuple, np.round(blocks.outline, 6))), sorted(map(tuple, SLOPE)))
+    again = mend(cut_by_sets(SLOPE, sets, seed), shortest=0.15, thinnest=0.08)
+    assert np.array_equal(again.points, blocks.points)
+
+
+def test_persistence_cuts_its_share_of_blocks():
+    square = np.array([(0, 0), (20, 0), (20, 20), (0, 20)], dtype=float)
+    whole = len(cut_by_sets(square, [JointSet(0.0, 1.0), JointSet(np.pi / 2, 1.0)], 3))
+    some = len(cut_by_sets(square, [JointSet(0.0, 1.0), JointSet(np.pi / 2, 1.0, 0.5)], 3))
+    rows = 20
+    assert (some - rows) / (whole - rows) == pytest.approx(0.5, abs=0.08)
+
+
+def test_slivers_join_the_neighbour_with_the_longest_common_edge():
+    wall = [
+        np.array([(0, 0), (2, 0), (2, 1), (0, 1)], float),
+        np.array([(0, 1), (2, 1), (2, 1.01), (0, 1.01)], float),
+        np.array([(0, 1.01), (1, 1.01), (1, 2), (0, 2)], float),
+        np.array([(1, 1.01), (2, 1.01), (2, 2), (1, 2)], float),
+    ]
+    blocks = mend(wall, shortest=0.0, thinnest=0.05)
+    assert blocks.size == 3
+    found, _ = polygons.areas_and_centroids(blocks.points, blocks.start, blocks.corner)
+    assert sorted(found) == pytest.approx([0.99, 0.99, 2.02])
+    # No corner in the middle of the long side: neighbours need not share corners.
+    assert sorted(np.diff(blocks.start)) == [4, 4, 4]
+
+
+def test_overlaps_and_crossings_are_refused():
+    one = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float)
+    with pytest.raises(ValueError, match="overlap"):
+        mend([one, one], shortest=0.0, thinnest=0.0)
+    with pytest.raises(ValueError, match="simple"):
+        mend([one[[0, 2, 1, 3]]], shortest=0.0, thinnest=0.0)
