@@ -83,11 +83,12 @@ class Problem:
         """
         law = LAWS[self.scene.law]
         damage = {p.name for p in law.parameters if p.when is not None and p.when[0] == "damage"}
+        amounts = {n: 0.0 for n in self.box.names if n.endswith("_damage") and n not in damage}
         free = self.box.names
         groups = [
             ("elastic", [n for n in free if n in _ELASTIC], _beginnings(curves), {"law": "elastic"}),
-            ("hardening", [n for n in free if n not in _ELASTIC and n not in damage], _rises(curves), {}),
-            ("damage", [n for n in free if n in damage], list(curves), {}),
+            ("hardening", [n for n in free if n not in {*_ELASTIC, *damage, *amounts}], _rises(curves), {}),
+            ("damage", [n for n in free if n in damage or n in amounts], list(curves), {}),
         ]
         known: dict[str, float] = {}
         evaluations = 0
@@ -98,8 +99,9 @@ class Problem:
             fixed = {**self.fixed, **known}
             if stage == "elastic":
                 fixed = {n: v for n, v in fixed.items() if n in _ELASTIC}
-            elif stage == "hardening" and damage:
-                fixed = {n: v for n, v in fixed.items() if n not in damage} | {"damage": "none"}
+            elif stage == "hardening":
+                fixed = {n: v for n, v in fixed.items() if n not in damage} | amounts
+                fixed |= {"damage": "none"} if damage else {}
             at = np.array([self.box.names.index(n) for n in names])
             box = Box.of(names, self.box.lower[at], self.box.upper[at], self.box.log[at])
             fit = self.fit(part, **{"fixed": fixed, "free": names} | changes)

@@ -192,3 +192,11 @@ def test_no_cluster_is_a_fault(tmp_path, monkeypatch):
     monkeypatch.setattr("graben.stages.calibrate_workers._PATIENCE_S", 1.0)
     with pytest.raises(BadInput, match="--cluster"):
         calibrate.run(SCENE, tmp_path / "o.nc", overrides=QUICK, cluster="tcp://127.0.0.1:9")
+
+
+@pytest.mark.parametrize("scene", sorted((PIPELINES / "upscaling/laws").glob("*.toml")), ids=lambda p: p.stem)
+def test_the_laws_to_compare_are_without_fault_and_fit(scene, tmp_path):
+    assert check(scene) == []
+    curves = [PIPELINES / "upscaling/reference/udec_voronoi_granite_fit.csv"]
+    headline = calibrate.run(scene, tmp_path / "o.nc", curves=curves, overrides=[*QUICK, "staged=true"])
+    assert headline["rmse_pa"] < 5e6

@@ -5,8 +5,8 @@ A particle moves as soon as its own evaluation is done: the swarm's best that it
 particle can run ahead of the slowest by `lag` generations, then it waits.
 
 Which best a particle sees is thus fixed by generation numbers and never by the order in which evaluations come
-back, and every particle has random numbers of its own: the same seed gives the same positions to the last bit on
-one worker and on a hundred, fast or slow.
+back, and random numbers belong to a particle and a generation: the same seed gives the same positions to the last bit
+on one worker and on a hundred, fast or slow.
 """
 
 from __future__ import annotations
@@ -28,42 +28,61 @@ class _Flock:
 
     def __init__(self, x: Array, v: Array, generations: int, seed: int, lag: int, rule: dict[str, float]) -> None:
         count = len(x)
-        self.x, self.v, self.lag, self.rule = x, v, lag, rule
+        self.x, self.v, self.seed, self.lag, self.rule = x, v, seed, lag, rule
         self.own, self.own_values = x.copy(), np.full(count, np.inf)
         self.generation = np.zeros(count, np.int64)  # the one that a particle is in
-        self.random = [np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, i]))) for i in range(count)]
-        self.trail = np.full((generations + 1, count), np.inf)  # value of each particle's own best
-        self.trail_x = np.empty((generations + 1, *x.shape))
-        self.left = np.full(generations + 1, count, np.int64)
+        self.waiting = np.zeros(count, bool)  # evaluated, and not moved since
+        self.left = np.full(generations + 1, count, np.int64)  # particles yet to be evaluated in a generation
         self.complete = -1  # all generations up to this one are evaluated
+        self.history = np.full(generations + 1, np.inf)
+        # Bests by generation and random numbers by generation; those that nobody needs any more are dropped.
+        self.leaders: dict[int, Array] = {}
+        self.trails: dict[int, tuple[Array, Array]] = {}
+        self.random: dict[int, Array] = {}
 
-    def record(self, i: int, value: float) -> None:
-        """The value of particle i where it stands."""
-        if value < self.own_values[i]:
-            self.own[i], self.own_values[i] = self.x[i], value
-        g = self.generation[i]
-        self.trail[g, i], self.trail_x[g, i] = self.own_values[i], self.own[i]
-        self.left[g] -= 1
+    def record(self, group: Array, values: Array) -> None:
+        """The values of the particles `group` (j,) where they stand."""
+        better = values < self.own_values[group]
+        self.own[group[better]], self.own_values[group[better]] = self.x[group[better]], values[better]
+        self.waiting[group] = True
+        for g in np.unique(self.generation[group]):
+            those = group[self.generation[group] == g]
+            if g not in self.trails:
+                self.trails[g] = np.full(len(self.x), np.inf), np.empty_like(self.x)
+            self.trails[g][0][those], self.trails[g][1][those] = self.own_values[those], self.own[those]
+            self.left[g] -= len(those)
         while self.complete + 1 < len(self.left) and self.left[self.complete + 1] == 0:
             self.complete += 1
+            trail, places = self.trails.pop(self.complete)
+            best = int(np.argmin(trail))
+            self.leaders[self.complete], self.history[self.complete] = places[best], trail[best]
 
-    def may_move(self, i: int) -> bool:
-        return bool(self.generation[i] - self.lag <= self.complete and self.generation[i] + 1 < len(self.left))
-
-    def move(self, i: int) -> None:
-        """Y (2.55), (2.56), with the swarm's best of `lag` generations before; at the start, the particle's own."""
-        g = self.generation[i]
-        seen = g - self.lag
-        leader = self.own[i] if seen < 0 else self.trail_x[seen, int(np.argmin(self.trail[seen]))]
-        u1, u2 = self.random[i].random((2, self.x.shape[1]))
+    def move(self) -> NDArray[np.int64]:
+        """Move every particle that may, Y (2.55), (2.56), with the swarm's best of `lag` generations before (at the
+        start, the particle's own); their numbers."""
+        able = self.waiting & (self.generation - self.lag <= self.complete) & (self.generation + 1 < len(self.left))
+        moved = np.flatnonzero(able)
         rule = self.rule
-        inertia = rule["inertia"] * (1.0 - rule["inertia_reduction"]) ** int(g)
-        pull = rule["cognitive"] * u1 * (self.own[i] - self.x[i]) + rule["social"] * u2 * (leader - self.x[i])
-        v = rule["constriction"] * (inertia * self.v[i] + pull)
-        x = self.x[i] + v
-        v[(x < 0.0) | (x > 1.0)] *= -0.5
-        self.x[i], self.v[i] = np.clip(x, 0.0, 1.0), v
-        self.generation[i] += 1
+        for g in np.unique(self.generation[moved]):
+            i = moved[self.generation[moved] == g]
+            leader = self.leaders[g - self.lag] if g >= self.lag else self.own[i]
+            if g not in self.random:
+                stream = np.random.Generator(np.random.PCG64(np.random.SeedSequence([self.seed, int(g)])))
+                self.random[g] = stream.random((2, *self.x.shape))
+            u1, u2 = self.random[g][:, i]
+            inertia = rule["inertia"] * (1.0 - rule["inertia_reduction"]) ** int(g)
+            pull = rule["cognitive"] * u1 * (self.own[i] - self.x[i]) + rule["social"] * u2 * (leader - self.x[i])
+            v = rule["constriction"] * (inertia * self.v[i] + pull)
+            x = self.x[i] + v
+            v[(x < 0.0) | (x > 1.0)] *= -0.5
+            self.x[i], self.v[i] = np.clip(x, 0.0, 1.0), v
+        self.generation[moved] += 1
+        self.waiting[moved] = False
+        slowest = int(self.generation.min())
+        for table, oldest in ((self.random, slowest), (self.leaders, slowest - self.lag)):
+            for g in [g for g in table if g < oldest]:
+                del table[g]
+        return moved
 
 
 def appso(
@@ -107,10 +126,10 @@ def appso(
         "constriction": constriction,
     }  # fmt: skip
     flock = _Flock(x, v, generations, seed, lag, rule)
-    ready, waiting = list(range(particles)), set()
-    pending: dict[Future[Any], list[int]] = {}
+    ready = np.arange(particles)
+    pending: dict[Future[Any], NDArray[np.int64]] = {}
     try:
-        while ready or pending:
+        while ready.size or pending:
             if executor is None:
                 back = [(ready, function(flock.x[ready]))]
             else:
@@ -121,15 +140,10 @@ def appso(
                 back = [(pending.pop(future), future.result()) for future in done]
             before = flock.complete
             for group, values in back:
-                for i, value in zip(group, finite_values(values, len(group))):
-                    flock.record(i, value)
-                    waiting.add(i)
-            ready = [i for i in sorted(waiting) if flock.may_move(i)]
-            waiting -= set(ready)
-            for i in ready:
-                flock.move(i)
+                flock.record(group, finite_values(values, len(group)))
+            ready = flock.move()
             if progress is not None and flock.complete > before:
-                progress(flock.complete / max(1, generations), float(flock.trail[flock.complete].min()))
+                progress(flock.complete / max(1, generations), float(flock.history[flock.complete]))
     except BaseException:
         for future in pending:
             future.cancel()
@@ -137,5 +151,5 @@ def appso(
     best = int(np.argmin(flock.own_values))
     return SwarmResult(
         flock.own[best].copy(), float(flock.own_values[best]), flock.own, flock.own_values,
-        flock.trail.min(axis=1), particles * (generations + 1),
+        flock.history, particles * (generations + 1),
     )  # fmt: skip

@@ -54,9 +54,8 @@ def dds(
         chosen = rng.random((chains, size)) < chance
         chosen[row, rng.integers(size, size=chains)] |= ~chosen.any(axis=1)
         trial = best + np.where(chosen, reach * rng.standard_normal((chains, size)), 0.0)
-        trial = np.where(trial < 0.0, -trial, trial)
-        trial = np.where(trial > 1.0, 2.0 - trial, trial)
-        trial = np.clip(trial, 0.0, 1.0)
+        # reflected at 0, then at 1
+        trial = np.maximum(1.0 - np.abs(1.0 - np.abs(trial)), 0.0)
         found = finite_values(function(trial), chains)
         better = found <= best_values
         best[better], best_values[better] = trial[better], found[better]

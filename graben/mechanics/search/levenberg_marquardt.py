@@ -90,12 +90,10 @@ def levenberg_marquardt(
         right = -(gradient[free] / s)
         lambdas = damping * factor ** np.arange(-(trials // 2), trials - trials // 2)
         points = np.repeat(x[None], trials, axis=0)
-        for i, lam in enumerate(lambdas):
-            move = np.linalg.solve(normal + lam * np.eye(free.size), right) / s
-            largest = np.abs(move).max()
-            if largest > move_limit:
-                move *= move_limit / largest
-            points[i, free] = np.clip(x[free] + move, 0.0, 1.0)
+        systems = normal + lambdas[:, None, None] * np.eye(free.size)
+        moves = np.linalg.solve(systems, np.repeat(right[None, :, None], trials, axis=0))[..., 0] / s
+        largest = np.maximum(np.abs(moves).max(axis=1), move_limit)
+        points[:, free] = np.clip(x[free] + moves * (move_limit / largest)[:, None], 0.0, 1.0)
         tried = function(points)
         evaluations += trials
         totals = np.einsum("ij,ij->i", tried, tried)
