@@ -195,7 +195,8 @@ class Skin:
     """The contact surface of all blocks: nodes that blend two vertices, and edges between them.
 
     Node i is (1 - weight[i]) * vertex first[i] + weight[i] * vertex second[i]; edge i runs from node i to node
-    follow[i], counter-clockwise, the block on its left. block : (nodes,); is_chamfer : (nodes,) flags.
+    follow[i], counter-clockwise, the block on its left. block : (nodes,); is_chamfer : (nodes,) flags;
+    edge : (nodes,) outline edge of the bodies; a chamfer counts to the one that follows.
     """
 
     first: np.ndarray
@@ -204,6 +205,7 @@ class Skin:
     follow: np.ndarray
     block: np.ndarray
     is_chamfer: np.ndarray
+    edge: np.ndarray
 
 
 def chamfered_skin(bodies: Bodies, rounding: float) -> Skin:
@@ -241,4 +243,4 @@ def chamfered_skin(bodies: Bodies, rounding: float) -> Skin:
     is_chamfer[k] = True
     follow = np.arange(1, node[-1] + 1)
     follow[node[loop_end] - 1] = node[loop_start]
-    return Skin(first, second, weight, follow, np.repeat(block, counts), is_chamfer)
+    return Skin(first, second, weight, follow, np.repeat(block, counts), is_chamfer, np.repeat(np.arange(n), counts))

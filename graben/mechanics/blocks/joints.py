@@ -10,10 +10,12 @@ Equal and opposite forces act at one point midway between the edges, so forces a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from graben.mechanics.blocks.memory import ask_for
 from graben.mechanics.compiled import kernel
 
 # Edges count as facing each other up to 60 degrees, fully up to 45: forces fade in between.
@@ -23,14 +25,20 @@ FACING_NONE, FACING_FULL = 0.5, 0.7
 # chamfers begin where their neighbour's contact ends, and would all touch by their rims, for next to no force.
 RIM_SHARE = 0.1
 
+# Pairs between the one in work and the one whose data are asked for.
+_AHEAD = 6
+
 STICK, SLIP, OPEN, BROKEN = 0, 1, 2, 3
 
 
 class Joint(NamedTuple):
     """Properties of one set of joints (stresses in Pa, stiffness in Pa/m, angles as tangents, lengths in m).
 
-    tension and cohesion hold for intact joints; once broken in tension a joint has no tension.
     dilation_limit: net slip after which a joint dilates no more (infinite: never stops).
+    tension holds for joints intact at the start, until broken in tension. residual_friction, residual_cohesion: of
+    joints that are not intact (broken in tension or by slip, or met on the way); below 0: as for intact ones.
+    closure: largest closure of a joint that stiffens hyperbolically from normal_stiffness on (Barton and Bandis),
+    sigma = kn u / (1 - u / closure), up to STIFFENING times as stiff; 0: linear.
     """
 
     normal_stiffness: float
@@ -40,6 +48,50 @@ class Joint(NamedTuple):
     tension: float
     dilation: float
     dilation_limit: float
+    residual_friction: float = -1.0
+    residual_cohesion: float = -1.0
+    closure: float = 0.0
+
+    @property
+    def weakens(self) -> bool:
+        """Whether slip breaks it for good."""
+        return self.residual_friction >= 0.0 or self.residual_cohesion >= 0.0
+
+    @property
+    def stiffest(self) -> float:
+        """Largest normal stiffness that it can have [Pa/m]."""
+        return self.normal_stiffness * (STIFFENING if self.closure > 0.0 else 1.0)
+
+
+# A closing joint is at most this much stiffer than at first; it is linear from there on.
+STIFFENING = 10.0
+_BEND = 1.0 - STIFFENING**-0.5
+
+
+def joint_table(joints: Sequence[Joint]) -> np.ndarray:
+    """Sets of joints as rows (sets, 10), in the order of `Joint`; residual values filled in."""
+    rows = []
+    for j in joints:
+        residual = [max(j.residual_friction, -1.0), max(j.residual_cohesion, -1.0)]
+        if j.weakens:
+            whole = (j.friction, j.cohesion)
+            residual = [r if r >= 0.0 else w for r, w in zip(residual, whole, strict=True)]
+        rows.append([*j[:7], *residual, j.closure])
+    return np.array(rows, dtype=float)
+
+
+@kernel(error_model="numpy")
+def closure_stress(u, kn, closure):
+    """Stress [Pa] at a closure u > 0 [m] of a joint that stiffens, and the energy stored [J/m2]."""
+    bend = _BEND * closure
+    v = min(u, bend)
+    stress = kn * v / (1.0 - v / closure)
+    energy = kn * closure * (-v - closure * np.log(1.0 - v / closure))
+    beyond = u - v
+    return (
+        stress + STIFFENING * kn * beyond,
+        energy + (stress + 0.5 * STIFFENING * kn * beyond) * beyond,
+    )
 
 
 class Pairs(NamedTuple):
@@ -72,7 +124,9 @@ def node_motion(x, v, first, second, weight, follow, node, begin, end):
 
     Rows begin and end with a block.
     """
+    last = node.shape[0] - 1
     for i in range(begin, end):
+        ask_for(node, min(i + _AHEAD, last))
         a = first[i]
         b = second[i]
         w = weight[i]
@@ -129,10 +183,12 @@ def forget(shear, flag, intact, c):
 
 
 @kernel(error_model="numpy")
-def contact_forces(active, begin, stop, pairs, follow, node, joint, deepest, dt, fn, node_end, far_of, far, sums):
+def contact_forces(
+    active, begin, stop, pairs, follow, node, table, joint, deepest, dt, fn, node_end, far_of, far, sums
+):
     """Stress update and forces of the active candidates; returns the pair that overlaps too much, or -1.
 
-    active[begin:stop] : indices into pairs, all of one set of joints; node : node table
+    active[begin:stop] : indices into pairs, all of set `joint` of table; node : node table
     fn : (nodes, 2) forces, added to [N/m]; those on the second edge, if it lies at or beyond node_end, go to row
     far_of[pair] of far (rows, 4) instead
     deepest : overlap above which a touching pair stops the run, and others are no contact [m]
@@ -141,15 +197,27 @@ def contact_forces(active, begin, stop, pairs, follow, node, joint, deepest, dt,
     # Taken out of the tuple once: inside the loop each look-up would count references.
     first, second, shears, slips = pairs.first, pairs.second, pairs.shear, pairs.slip
     flags, live, intact = pairs.flag, pairs.live, pairs.intact
-    cohesion, friction, dilation, limit = joint.cohesion, joint.friction, joint.dilation, joint.dilation_limit
-    tensile = joint.tension
-    kn = joint.normal_stiffness
-    ks = joint.shear_stiffness
+    kn, ks, peak_friction, peak_cohesion = table[joint, 0], table[joint, 1], table[joint, 2], table[joint, 3]
+    tensile, dilation, limit = table[joint, 4], table[joint, 5], table[joint, 6]
+    residual_friction, residual_cohesion, closure = table[joint, 7], table[joint, 8], table[joint, 9]
+    weakens = residual_friction >= 0.0
     compliance = 1.0 / ks
     ksdt = ks * dt
+    last = node.shape[0] - 1
     friction_work = 0.0
     largest = sums[1]
     for m in range(begin, stop):
+        # Edges face each other in no order of memory: ask early for what is due some pairs later.
+        c = active[min(m + _AHEAD, stop - 1)]
+        e = first[c]
+        f = second[c]
+        ask_for(node, e)
+        ask_for(node, f)
+        ask_for(node, min(f + 1, last))
+        ask_for(fn, e)
+        ask_for(fn, f)
+        ask_for(shears, c)
+        ask_for(slips, c)
         c = active[m]
         e = first[c]
         f = second[c]
@@ -229,12 +297,21 @@ def contact_forces(active, begin, stop, pairs, follow, node, joint, deepest, dt,
             gap = gap0 if k == 0 else gap1
             slip = slips[c, k]
             open_by_dilation = dilation * min(abs(slip), limit)
-            sigma = kn * (open_by_dilation - gap)
-            tension = tensile if intact[c] == 1 and flags[c, k] != BROKEN else 0.0
+            closed = open_by_dilation - gap
+            sigma = kn * closed
+            if closure > 0.0 and closed > 0.0:
+                sigma = closure_stress(closed, kn, closure)[0]
+            whole = intact[c] == 1 and flags[c, k] != BROKEN
+            tension = tensile if whole else 0.0
             if sigma <= -tension:
+                # What the joint stored is lost with it.
+                lost = shears[c, k] * shears[c, k] * compliance
+                if tension > 0.0:
+                    lost += sigma * sigma / kn
+                friction_work += 0.5 * lost * area
                 shears[c, k] = 0.0
                 if flags[c, k] != BROKEN:
-                    flags[c, k] = BROKEN if intact[c] == 1 and tension > 0.0 else OPEN
+                    flags[c, k] = BROKEN if whole and (tension > 0.0 or weakens) else OPEN
                 continue
             alpha = s * de
             beta = (s0 - s) * df
@@ -243,11 +320,19 @@ def contact_forces(active, begin, stop, pairs, follow, node, joint, deepest, dt,
             vy = (1.0 - beta) * node[f, VY] + beta * node[f2, VY]
             vy -= (1.0 - alpha) * node[e, VY] + alpha * node[e2, VY]
             tau = shears[c, k] + ksdt * (vx * tx + vy * ty)
-            strength = cohesion + sigma * friction
-            if strength < 0.0:
-                strength = 0.0
+            cohesion = peak_cohesion
+            friction = peak_friction
+            if weakens and not whole:
+                cohesion = residual_cohesion
+                friction = residual_friction
+            strength = max(cohesion + sigma * friction, 0.0)
             flag = STICK
             if abs(tau) > strength:
+                if weakens and whole:
+                    # It breaks: strength falls at once, and with it what it stored.
+                    strength = max(residual_cohesion + sigma * residual_friction, 0.0)
+                    friction_work += 0.5 * compliance * (abs(tau) - strength) ** 2 * area
+                    flags[c, k] = BROKEN
                 limited = strength if tau > 0.0 else -strength
                 slid = (tau - limited) * compliance
                 slip += slid
@@ -297,7 +382,7 @@ def contact_forces(active, begin, stop, pairs, follow, node, joint, deepest, dt,
 
 
 @kernel(error_model="numpy")
-def contact_state(pairs, follow, node, joint, deepest, out, ints):
+def contact_state(pairs, follow, node, table, deepest, out, ints):
     """State of all touching candidates, for output. Returns (their number, stored joint energy [J/m]).
 
     out : (n, 11) position x, y [m]; force on the first edge x, y [N/m]; mean normal (tension positive) and shear
@@ -311,6 +396,8 @@ def contact_state(pairs, follow, node, joint, deepest, out, ints):
             continue
         e = pairs.first[c]
         f = pairs.second[c]
+        j = pairs.joint[c]
+        kn = table[j, 0]
         facing = -(node[e, TX] * node[f, TX] + node[e, TY] * node[f, TY])
         if facing <= FACING_NONE:
             continue
@@ -352,21 +439,17 @@ def contact_state(pairs, follow, node, joint, deepest, out, ints):
             flag = pairs.flag[c, k]
             if flag == OPEN:
                 continue
-            opened = joint.dilation * min(abs(pairs.slip[c, k]), joint.dilation_limit)
-            sigma = joint.normal_stiffness * (opened - gap)
+            closed_by = table[j, 5] * min(abs(pairs.slip[c, k]), table[j, 6]) - gap
+            sigma = kn * closed_by
+            energy = 0.5 * sigma * closed_by
+            if table[j, 9] > 0.0 and closed_by > 0.0:
+                sigma, energy = closure_stress(closed_by, kn, table[j, 9])
             if flag == BROKEN and sigma <= 0.0:
                 continue
             closed += 1
             normal -= 0.5 * sigma
             shear += 0.5 * pairs.shear[c, k]
-            stored += (
-                0.5
-                * area
-                * (
-                    sigma * sigma / joint.normal_stiffness
-                    + pairs.shear[c, k] * pairs.shear[c, k] / joint.shear_stiffness
-                )
-            )
+            stored += area * (energy + 0.5 * pairs.shear[c, k] * pairs.shear[c, k] / table[j, 1])
             if flag == SLIP and worst == STICK:
                 worst = SLIP
             if flag == BROKEN:

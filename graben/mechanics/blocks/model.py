@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,8 +20,10 @@ from graben.mechanics.blocks.joints import (
     Joint,
     Pairs,
     contact_state,
+    joint_table,
     node_motion,
 )
+from graben.mechanics.blocks.memory import aligned
 from graben.mechanics.blocks.parts import cut_into_parts
 from graben.mechanics.failure import NumericsFailed
 
@@ -49,6 +52,8 @@ class BlockModel:
     dt : time step [s]. Given, masses follow from stiffness so that this step is stable everywhere (density scaling,
     for slow loading); None: true masses, and dt from the estimate.
     gravity : (gx, gy) [m/s2], always with true masses.
+    more_joints : sets 1, 2, ... beside `joint`, which is set 0; edge_set : (outline edges of the bodies,) set of each
+    edge; set_between : (sets, sets) set that holds between edges of two sets, by default the lower of both.
     threads : more than 1 shares the work out to numba's threads, with bitwise the same result.
     """
 
@@ -66,15 +71,20 @@ class BlockModel:
         damping: Damping | None = None,
         intact: bool = True,
         threads: int = 1,
+        more_joints: Sequence[Joint] = (),
+        edge_set: np.ndarray | None = None,
+        set_between: np.ndarray | None = None,
     ) -> None:
-        for name, value in (("young", young), ("density", density), ("kn", joint.normal_stiffness)):
+        kn = min(j.normal_stiffness for j in (joint, *more_joints))
+        for name, value in (("young", young), ("density", density), ("kn", kn)):
             if not value > 0.0:
                 raise ValueError(f"{name} must be positive, found {value}")
         if not -1.0 < poisson < 0.5:
             raise ValueError(f"poisson must lie between -1 and 0.5, found {poisson}")
         self.bodies = bodies
         self.joint = joint
-        self.joints: tuple[Joint, ...] = (joint,)
+        self.joints: tuple[Joint, ...] = (joint, *more_joints)
+        self.joint_table = joint_table(self.joints)
         self.damping = damping or Damping()
         self.skin: Skin = chamfered_skin(bodies, rounding)
         self.parts = cut_into_parts(bodies, self.skin)
@@ -92,22 +102,29 @@ class BlockModel:
         else:
             self.dt = float(dt)
             mass = stiffness * dt**2 / (4.0 * SAFETY**2)
-        self._edge_material = np.zeros(nn, dtype=np.int64)
-        self._set_of = np.zeros((1, 1), dtype=np.int64)
+        sets = np.arange(len(self.joints))
+        given = np.zeros(len(bodies.edge_from)) if edge_set is None else np.asarray(edge_set)
+        between = np.minimum.outer(sets, sets) if set_between is None else np.asarray(set_between)
+        if given.shape != bodies.edge_from.shape or not np.isin(given, sets).all():
+            raise ValueError(f"edge_set: expected {len(bodies.edge_from)} numbers of joint sets (0 to {sets[-1]})")
+        if between.shape != (len(sets),) * 2 or not np.isin(between, sets).all() or np.any(between != between.T):
+            raise ValueError(f"set_between: expected a symmetric table {len(sets)} x {len(sets)} of joint sets")
+        self._edge_material = given.astype(np.int64)[self.skin.edge]
+        self._set_of = np.ascontiguousarray(between, dtype=np.int64)
         self.threads = threads
         self.held = np.zeros((nv, 2), dtype=bool)
         self.weight = self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :]
         self.mass_ratio = mass / self.true_mass
         self.skeleton = rx.Skeleton(
-            bodies.zone_vertex,
+            bodies.zone_vertex.astype(np.int32),
             gradient,
             area,
             lam_z,
             mu_z,
-            self.skin.first,
-            self.skin.second,
+            self.skin.first.astype(np.int32),
+            self.skin.second.astype(np.int32),
             self.skin.weight,
-            self.skin.follow,
+            self.skin.follow.astype(np.int32),
             mass,
             np.empty((0, 2), dtype=np.int64),
             np.zeros(len(self.parts.node), dtype=np.int64),
@@ -126,8 +143,8 @@ class BlockModel:
             np.zeros((nv, 2)),
             np.zeros((nv, 2)),
             np.zeros((nv, 2)),
-            np.zeros((nn, COLUMNS)),
-            np.zeros((nn, 2)),
+            aligned(nn, COLUMNS),
+            aligned(nn, 2),
             np.zeros(6),
             np.zeros(2),
             np.zeros(5),
@@ -157,7 +174,7 @@ class BlockModel:
         length = np.linalg.norm(b.position[b.edge_to] - b.position[b.edge_from], axis=1)
         # An edge holds half its length at each end, against another block: twice in a row sum. Sliding blocks
         # can face two others, so the half counts in full.
-        k = 2.0 * max(self.joint.normal_stiffness, self.joint.shear_stiffness)
+        k = 2.0 * max(max(j.stiffest, j.shear_stiffness) for j in self.joints)
         np.add.at(total, b.edge_from, k * length)
         np.add.at(total, b.edge_to, k * length)
         return total
@@ -169,7 +186,7 @@ class BlockModel:
         if not np.all(np.isfinite(m.node)):
             raise NumericsFailed("a position is not finite", step=self.steps_done, advice=_SLOWER)
         slid = float(np.abs(self.pairs.slip).max()) if len(self.pairs.slip) else 0.0
-        held = self.joint.dilation * min(slid, self.joint.dilation_limit)
+        held = max(j.dilation * min(slid, j.dilation_limit) for j in self.joints)
         cell = max(self.block_size, float(np.sqrt(self._span.prod() / (4.0 * len(s.first)))))
         nx, ny = (int(n) for n in np.maximum(1, np.ceil(self._span / cell)))
         keys = search.find_keys(
@@ -186,7 +203,7 @@ class BlockModel:
             self.pairs.live,
         )
         self.pairs = search.carry_history(keys, len(s.first), self.pairs, self._edge_material, self._set_of)
-        if first and any(j.tension > 0.0 for j in self.joints):
+        if first and any(j.tension > 0.0 or j.weakens for j in self.joints):
             self._bond()
         self.motion = m._replace(**search.fresh_watch(self.pairs, self.parts, m.node, len(self.joints)))
         self.rebuilds += 1
@@ -207,7 +224,8 @@ class BlockModel:
     def advance(self, steps: int) -> None:
         """Take `steps` time steps. Raises NumericsFailed when something runs away or blocks overlap too far."""
         left = steps
-        step = rx.advance_together if self.threads > 1 and len(self.parts.node) > 2 else rx.advance
+        several = self.threads > 1 and len(self.parts.node) > 2
+        step, extra = (rx.advance_together, (self.threads,)) if several else (rx.advance, ())
         while left > 0:
             status, done, where = step(
                 left,
@@ -215,7 +233,7 @@ class BlockModel:
                 self.motion,
                 self.parts,
                 self.pairs,
-                self.joints,
+                self.joint_table,
                 self.dt,
                 self.reach,
                 self.near,
@@ -225,6 +243,7 @@ class BlockModel:
                 0.5 / self.dt,
                 self.damping.local,
                 self.most_energy,
+                *extra,
             )
             left -= done
             self.steps_done += done
@@ -311,7 +330,7 @@ class BlockModel:
         node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.node, 0, len(m.node))
         n = len(self.pairs.key)
         out, ints = np.zeros((n, 11)), np.zeros((n, 2), dtype=np.int64)
-        count, stored = contact_state(self.pairs, s.follow, m.node, self.joint, self.deepest, out, ints)
+        count, stored = contact_state(self.pairs, s.follow, m.node, self.joint_table, self.deepest, out, ints)
         return out[:count], ints[:count], stored
 
     def energies(self) -> dict[str, float]:

@@ -30,7 +30,7 @@ class Parts(NamedTuple):
 
 
 def cut_into_parts(bodies: Bodies, skin: Skin) -> Parts:
-    """Parts of about `PART_BLOCKS` blocks, in order of storage; one part if vertices, zones and nodes differ in that."""
+    """Parts of about `PART_BLOCKS` blocks, as stored; one part if vertices, zones and nodes differ in that."""
     places = [_runs(a) for a in (skin.block, bodies.vertex_block, bodies.zone_block)]
     blocks = places[0][0]
     same = all(len(p[0]) == len(blocks) and np.array_equal(p[0], blocks) for p in places)

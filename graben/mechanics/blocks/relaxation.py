@@ -57,13 +57,13 @@ class Motion(NamedTuple):
 
     x, v, zone_force, joint_force, reaction : (vertices, 2); node : node table (nodes, 8); fn : (nodes, 2)
     From start on, the watch: which candidates are awake, part by part, and when to look at each of them again.
-    start : (parts + 1,) first candidate of each part, that of its first edge; awake ones are listed in active, those of
-    part p and set of joints s from turn[p, s] to turn[p, s + 1]
-    kind : (n,) what a candidate was when last looked at; wake : (n,) path [m] of its two blocks at which to look again
-    far_start : (parts + 1,), far_of : (n,) row of `far` (rows, 4) through which a pair hands forces on to another part,
-    -1 within a part; post_start : (parts + 1,), post : (rows, 2) row and node of the forces handed to each part
+    start : (parts + 1,) first candidate of each part, that of its first edge; awake ones are listed in active, those
+    of part p and set of joints s from turn[p, s] to turn[p, s + 1]
+    kind : (n,) what a candidate was when last looked at; wake : (n,) path [m] of its blocks at which to look again
+    far_start : (parts + 1,), far_of : (n,) row of `far` (rows, 4) through which a pair hands forces on to another
+    part, -1 within a part; post_start : (parts + 1,), post : (rows, 2) row and node of the forces handed to each part
     path, gone : (blocks,) bounds on the path of a block's nodes up to the reference and up to now; reference,
-    built : (nodes, 2) positions then and at the search; farthest : (parts, 2) squares of distance since then and speed
+    built : (nodes, 2) positions then and at the search; farthest : (parts, 2) squares of distance since, and speed
     due : (1,) steps until the next look at how far nodes went
     """
 
@@ -99,7 +99,7 @@ class Motion(NamedTuple):
 def _move(p, s, m, parts, load, alpha, local, dt, speed, sums):
     """New velocities and positions in part p; adds up kinetic energy, and the powers of damping, loads and walls.
 
-    Vertices of prescribed velocity move freely in the first loop, which knows no exceptions, and are put right after it.
+    Vertices of prescribed velocity move freely in the first loop, which knows no exceptions, and are put right after.
     """
     x, v, mass, zone, joint, reaction = m.x, m.v, s.mass, m.zone_force, m.joint_force, m.reaction
     steady, rising, still, wall = s.steady, s.rising, s.still, s.wall
@@ -187,7 +187,8 @@ def _press(p, s, m, parts, pairs, joints, deepest, dt, sums):
             pairs,
             s.follow,
             m.node,
-            joints[k],
+            joints,
+            k,
             deepest,
             dt,
             fn,
@@ -312,7 +313,7 @@ def advance(
 ):
     """Up to `steps` steps of `dt` [s]. Returns (status, steps done, pair concerned).
 
-    s, m, parts : Skeleton, Motion, Parts; joints : sets of joints; dilation : largest tangent among them
+    s, m, parts : Skeleton, Motion, Parts; joints : table of sets of joints; dilation : largest tangent among them
     skin, near : reach of the candidates and of the awake ones [m]; deepest : overlap limit [m]
     damping_ratio : adaptive global damping holds its power at this ratio to the rate of kinetic energy; below 0
     the damping coefficient in motion.drive stays as it is; damping_limit : its upper bound [1/s]
@@ -332,27 +333,71 @@ def advance(
                 look_again(p, parts, pairs, s.follow, m.node, near, dilation, m)
             m.due[0] = _next_look(m, near, dt)
         m.due[0] -= 1
+        load, speed, alpha = _next_drive(m)
+        # A pair belongs to the lower of its parts: once all parts up to p are pressed, nobody reads the nodes of p.
         for p in range(count):
             _press(p, s, m, parts, pairs, joints, deepest, dt, sums)
+            _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums)
         bad = _deep(sums)
         if bad >= 0:
             m.sums[LARGEST_OVERLAP] = sums[:, _OVERLAP].max()
             return DEEP_OVERLAP, step, bad
-        load, speed, alpha = _next_drive(m)
-        for p in range(count):
-            _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums)
         if not _gather(m, sums, damping_ratio, damping_limit, alpha, dt) < fastest:
             return RUNAWAY, step, -1
     return DONE, steps, -1
 
 
+@kernel(error_model="numpy")
+def _share_out(m, count, shares):
+    """Parts of each share, and which parts push on another share: these are pressed before anything moves."""
+    share = np.empty(shares + 1, dtype=np.int64)
+    for k in range(shares + 1):
+        share[k] = (k * count) // shares
+    of = np.empty(count, dtype=np.int64)
+    for k in range(shares):
+        of[share[k] : share[k + 1]] = k
+    before = np.zeros(count, dtype=np.int64)
+    for q in range(count):
+        for k in range(m.post_start[q], m.post_start[q + 1]):
+            p = np.searchsorted(m.far_start, m.post[k, 0], side="right") - 1
+            if of[p] != of[q]:
+                before[p] = 1
+    return share, before
+
+
+@kernel(error_model="numpy")
+def _work_share(first, stop, before, s, m, parts, pairs, joints, deepest, dt, load, alpha, local, speed, sums):
+    """The parts of one share in order, as `advance` takes all parts."""
+    for p in range(first, stop):
+        if before[p] == 0:
+            _press(p, s, m, parts, pairs, joints, deepest, dt, sums)
+        _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums)
+
+
 @kernel(error_model="numpy", parallel=True)
 def advance_together(
-    steps, s, m, parts, pairs, joints, dt, skin, near, dilation, deepest, damping_ratio, damping_limit, local, fastest
+    steps,
+    s,
+    m,
+    parts,
+    pairs,
+    joints,
+    dt,
+    skin,
+    near,
+    dilation,
+    deepest,
+    damping_ratio,
+    damping_limit,
+    local,
+    fastest,
+    threads,
 ):
     """`advance` with parts shared out to threads: the same result, bit for bit."""
     count = parts.node.shape[0] - 1
     sums = np.zeros((count, _SUMS))
+    shares = min(count, threads)
+    share, before = _share_out(m, count, shares)
     _begin(s, m)
     for step in range(steps):
         if m.due[0] <= 0:
@@ -364,15 +409,32 @@ def advance_together(
                 look_again(p, parts, pairs, s.follow, m.node, near, dilation, m)
             m.due[0] = _next_look(m, near, dt)
         m.due[0] -= 1
-        for p in numba.prange(count):
-            _press(p, s, m, parts, pairs, joints, deepest, dt, sums)
+        load, speed, alpha = _next_drive(m)
+        for k in numba.prange(count):
+            if before[k] == 1:
+                _press(k, s, m, parts, pairs, joints, deepest, dt, sums)
+        for k in numba.prange(shares):
+            _work_share(
+                share[k],
+                share[k + 1],
+                before,
+                s,
+                m,
+                parts,
+                pairs,
+                joints,
+                deepest,
+                dt,
+                load,
+                alpha,
+                local,
+                speed,
+                sums,
+            )
         bad = _deep(sums)
         if bad >= 0:
             m.sums[LARGEST_OVERLAP] = sums[:, _OVERLAP].max()
             return DEEP_OVERLAP, step, bad
-        load, speed, alpha = _next_drive(m)
-        for p in numba.prange(count):
-            _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums)
         if not _gather(m, sums, damping_ratio, damping_limit, alpha, dt) < fastest:
             return RUNAWAY, step, -1
     return DONE, steps, -1

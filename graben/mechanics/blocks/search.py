@@ -136,7 +136,9 @@ def no_pairs() -> Pairs:
     """An empty set of candidates."""
     i, mark, f = np.empty(0, dtype=np.int32), np.empty(0, dtype=np.int8), np.empty((0, 2))
     flag = np.empty((0, 2), dtype=np.int8)
-    return Pairs(np.empty(0, dtype=np.int64), i, i.copy(), f, f.copy(), flag, mark, mark.copy(), np.empty(0, dtype=np.int16))
+    return Pairs(
+        np.empty(0, dtype=np.int64), i, i.copy(), f, f.copy(), flag, mark, mark.copy(), np.empty(0, dtype=np.int16)
+    )
 
 
 def fresh_watch(pairs: Pairs, parts: Parts, node: np.ndarray, sets: int = 1) -> dict[str, np.ndarray]:

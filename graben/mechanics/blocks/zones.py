@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from graben.mechanics.blocks.memory import ask_for
 from graben.mechanics.compiled import kernel
 
 
@@ -48,7 +49,9 @@ def stiffness_row_sums(gradient: np.ndarray, area: np.ndarray, lam: np.ndarray, 
 @kernel(error_model="numpy")
 def zone_forces(x, triangles, gradient, area, lam, mu, force, begin, end):
     """Add the forces of the zones, rows begin to end, on their vertices to `force` (vertices, 2) [N/m]."""
+    last = end - 1
     for z in range(begin, end):
+        ask_for(gradient, min(z + 6, last))
         a = triangles[z, 0]
         b = triangles[z, 1]
         c = triangles[z, 2]

@@ -59,7 +59,9 @@ def test_kernel_against_reference(seed):
     row, far = np.zeros(1, dtype=np.int32), np.zeros((1, 4))
     # The second edge may belong to another part: then its forces wait in `far`.
     end = 4 if seed % 3 else 2
-    bad = joints.contact_forces(first, 0, 1, pairs, follow, node, JOINT, 1.0, dt, force, end, row, far, sums)
+    bad = joints.contact_forces(
+        first, 0, 1, pairs, follow, node, joints.joint_table([JOINT]), 0, 1.0, dt, force, end, row, far, sums
+    )
     assert np.any(force[2:]) != np.any(far) or not np.any(force)
     force[2:] += far.reshape(2, 2)
     assert bad == -1
