@@ -1,63 +1,21 @@
-"""J2 (von Mises) plasticity with isotropic hardening from a table, radial return in closed form.
+"""J2 (von Mises) plasticity with isotropic hardening: a table, a line or an exponential (`j2_hardening`).
 
-Strength follows sigma_y(p), piecewise linear in the equivalent plastic strain p; beyond the last pair it stays
-constant. The return is exact: the segment of the solution is found by walking the table, and the increment
-solves ``q_trial - 3 G dp = sigma_y(p + dp)`` there, without iteration.
+The return is radial: the increment dp of the equivalent plastic strain solves ``q_trial - 3 G dp = sigma_y(p + dp)``,
+in closed form along a table or a line.
 
-Slots of ``par``: E [Pa], nu, count, then `count` pairs (p, sigma_y [Pa]); the first p is 0.
-State: equivalent plastic strain p.
+Slots of ``par``: E [Pa], nu, then those of `j2_hardening`. State: equivalent plastic strain p.
 """
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from graben.mechanics.compiled import kernel
 from graben.mechanics.materials.elastic import POISSON, YOUNG, finite
-from graben.mechanics.materials.law import NOT_FINITE, OK, Law, Parameter
+from graben.mechanics.materials.j2_hardening import FORMS, hardening_faults, return_to_strength
+from graben.mechanics.materials.law import NOT_FINITE, OK, Law
 
-TABLE = 2  # where the hardening table starts in par: count, then pairs
-
-
-@kernel(error_model="numpy")
-def yield_stress(p, par, start):
-    """Yield stress [Pa] at equivalent plastic strain p by the table at par[start:]."""
-    count = int(par[start])
-    i = start + 1
-    for k in range(count - 1):
-        right = par[i + 2 * (k + 1)]
-        if p <= right:
-            left, low = par[i + 2 * k], par[i + 2 * k + 1]
-            return low + (par[i + 2 * (k + 1) + 1] - low) * (p - left) / (right - left)
-    return par[i + 2 * (count - 1) + 1]
-
-
-@kernel(error_model="numpy")
-def return_to_table(q_trial, p, three_g, par, start, scale):
-    """Increment dp >= 0 that solves ``q_trial - three_g dp = scale * sigma_y(p + dp)``, and the slope there.
-
-    Returns (dp, hardening): hardening is ``scale * d sigma_y / dp`` [Pa] on the segment of the solution.
-    (0, 0) if ``q_trial`` lies inside the yield surface. The table must not soften.
-    """
-    now = scale * yield_stress(p, par, start)
-    if q_trial <= now:
-        return 0.0, 0.0
-    count = int(par[start])
-    i = start + 1
-    left, low = p, now
-    for k in range(1, count):
-        right = par[i + 2 * k]
-        if right <= p:
-            continue
-        high = scale * par[i + 2 * k + 1]
-        if q_trial - three_g * (right - p) <= high:
-            slope = (high - low) / (right - left)
-            return (q_trial - low + three_g * p + slope * left) / (three_g + slope) - p, slope
-        left, low = right, high
-    return (q_trial - low) / three_g, 0.0
+STRENGTH = 2  # where the slots of the hardening start in par
 
 
 @kernel(error_model="numpy")
@@ -100,10 +58,10 @@ def update_j2(deps, sig, state, par, length, tangent):
         sig[i] = s
         square += 2.0 * s * s
     q = np.sqrt(1.5 * square)
-    dp, slope = return_to_table(q, state[0], 3.0 * shear, par, TABLE, 1.0)
+    dp, slope, strength = return_to_strength(q, state[0], 3.0 * shear, par, STRENGTH, 1.0)
     theta = 1.0
     if dp > 0.0:
-        theta = 1.0 - 3.0 * shear * dp / q
+        theta = strength / q
         state[0] += dp
     if tangent.shape[0] > 0:
         bar = 0.0
@@ -117,31 +75,11 @@ def update_j2(deps, sig, state, par, length, tangent):
     return OK
 
 
-def hardening_faults(values: Mapping[str, Any]) -> list[str]:
-    """What is wrong with a hardening table beyond its shape; empty when it can be used."""
-    rows = np.asarray(values["hardening"], dtype=np.float64)
-    found = []
-    if rows[0, 0] != 0.0:
-        found.append("hardening: the first plastic strain must be 0")
-    if np.any(rows[:, 1] <= 0.0):
-        found.append("hardening: yield stresses must be positive")
-    if np.any(np.diff(rows[:, 1]) < 0.0):
-        found.append("hardening: yield stresses must not fall (softening belongs to damage)")
-    return found
-
-
-HARDENING = Parameter(
-    "hardening",
-    "Pa",
-    description="table of (equivalent plastic strain, yield stress in Pa), linear between, constant beyond",
-    table=True,
-)
-
 J2 = Law(
     id=1,
     name="j2",
-    title="von Mises plasticity with a hardening table",
-    parameters=(YOUNG, POISSON, HARDENING),
+    title="von Mises plasticity with isotropic hardening",
+    parameters=(YOUNG, POISSON, *FORMS),
     state_names=("equivalent_plastic_strain",),
     initial_state=lambda par: np.zeros(1),
     check=hardening_faults,

@@ -30,7 +30,8 @@ class Parameter:
 
     unit is SI ("Pa", "rad", "m", "1"); lower and upper are inclusive bounds of what the law can compute, not of
     what is usual (`usual` says that). default None means required. `choices` makes it a word, stored as its index.
-    `when = (other, word)` says that it counts only if the choice parameter `other` is `word`.
+    `when = (other, word)` says that it counts only if the choice parameter `other` is `word` (or one of
+    several, "a|b").
     `table` makes it an (n, 2) array with rising first column.
     """
 
@@ -80,19 +81,32 @@ class Law:
         """Slot of a number or choice parameter in `par`."""
         return [p.name for p in self.parameters if not p.table].index(name)
 
+    def spelled_out(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """`values`, where rows given for a choice stand for that choice's table: hardening = [[...]] is the word
+        "table" and hardening_table = [[...]]."""
+        out = dict(values)
+        for p in self.parameters:
+            if "table" in p.choices and p.name in out and not isinstance(out[p.name], str | None):
+                rows = out[p.name]
+                out[p.name] = "table"
+                out.setdefault(f"{p.name}_table", rows)
+        return out
+
     def active(self, values: Mapping[str, Any]) -> tuple[Parameter, ...]:
         """Parameters that count, given the choices in `values`."""
+        values = self.spelled_out(values)
 
         def counts(p: Parameter) -> bool:
             if p.when is None:
                 return True
             other = self.parameter(p.when[0])
-            return values.get(other.name, other.default) == p.when[1]
+            return values.get(other.name, other.default) in p.when[1].split("|")
 
         return tuple(p for p in self.parameters if counts(p))
 
     def faults(self, values: Mapping[str, Any]) -> list[tuple[str, str]]:
         """Every fault of `values` as (parameter name, what was expected); empty when they can be packed."""
+        values = self.spelled_out(values)
         found: list[tuple[str, str]] = []
         names = {p.name for p in self.parameters}
         for name in values:
@@ -129,6 +143,7 @@ class Law:
         faults = self.faults(values)
         if faults:
             raise ValueError(f"{self.name}: " + "; ".join(f"{name}: expected {text}" for name, text in faults))
+        values = self.spelled_out(values)
         numbers: list[float] = []
         tables: list[float] = []
         active = self.active(values)

@@ -16,7 +16,8 @@ To add a law: write `<name>.py` with `update_<name>` and a `Law` record with a f
 the record to `_RECORDS` and a branch to `update` (and to `prepare`, if the law has derived values). State index 0 is
 the equivalent plastic strain, index 1 the damage, where they exist.
 
-ids: 0 elastic, 1 j2, 2 mohr-coulomb, 3 drucker-prager, 4 lubliner, 5 erve.
+ids: 0 elastic, 1 j2, 2 mohr-coulomb, 3 drucker-prager, 4 lubliner, 5 erve, 6 transverse-elastic,
+7 energy-damage.
 """
 
 from __future__ import annotations
@@ -34,13 +35,24 @@ from graben.mechanics.materials.drucker_prager import (
     update_drucker_prager,
 )
 from graben.mechanics.materials.elastic import ELASTIC, update_elastic
+from graben.mechanics.materials.energy_damage import ENERGY_DAMAGE, update_energy_damage
 from graben.mechanics.materials.erve import ERVE, update_erve
 from graben.mechanics.materials.j2 import J2, update_j2
 from graben.mechanics.materials.law import UNKNOWN_LAW, Law
 from graben.mechanics.materials.lubliner import LUBLINER, prepare_lubliner, update_lubliner
 from graben.mechanics.materials.mohr_coulomb import MOHR_COULOMB, update_mohr_coulomb
+from graben.mechanics.materials.transverse import TRANSVERSE, prepare_transverse, update_transverse
 
-_RECORDS: tuple[Law, ...] = (ELASTIC, J2, MOHR_COULOMB, DRUCKER_PRAGER, LUBLINER, ERVE)
+_RECORDS: tuple[Law, ...] = (
+    ELASTIC,
+    TRANSVERSE,
+    J2,
+    MOHR_COULOMB,
+    DRUCKER_PRAGER,
+    LUBLINER,
+    ERVE,
+    ENERGY_DAMAGE,
+)
 
 LAWS: dict[str, Law] = {record.name: record for record in _RECORDS}
 
@@ -60,6 +72,10 @@ def update(law_id, deps, sig, state, par, length, tangent):
         return update_erve(deps, sig, state, par, length, tangent)
     if law_id == 0:
         return update_elastic(deps, sig, state, par, length, tangent)
+    if law_id == 6:
+        return update_transverse(deps, sig, state, par, length, tangent)
+    if law_id == 7:
+        return update_energy_damage(deps, sig, state, par, length, tangent)
     return UNKNOWN_LAW
 
 
@@ -70,6 +86,8 @@ def prepare(law_id, par):
         prepare_drucker_prager(par)
     elif law_id == 4:
         prepare_lubliner(par)
+    elif law_id == 6:
+        prepare_transverse(par)
 
 
 def find(name: str) -> Law:

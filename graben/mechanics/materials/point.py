@@ -236,6 +236,11 @@ class Response:
     complete: NDArray[np.bool_]
 
 
+def _with_free_zz(word: str) -> str:
+    """A control word over (xx, yy, xy) -> over (xx, yy, zz, xy)."""
+    return word[:2] + "s" + word[2:]
+
+
 def follow(
     law: str,
     par: NDArray[np.float64],
@@ -254,9 +259,10 @@ def follow(
     ----------
     law, par : name of the law and its packed parameters (`laws.pack`)
     control : one word over components, "e" strain and "s" stress, such as "seee"; or one word per path
-    targets : (paths, steps, n) or (steps, n), n 4 or 6; strain (tensor shear) or stress in Pa to reach at
-    each step;
-        step 0 is where the path starts and nothing is done to get there
+    targets : (paths, steps, n) or (steps, n); strain (tensor shear) or stress in Pa to reach at each step;
+        step 0 is where the path starts and nothing is done to get there. n = 6: space (xx, yy, zz, xy, yz, zx);
+        n = 4: plane or axisymmetric (xx, yy, zz, xy); n = 3: plane stress (xx, yy, xy), the same as n = 4 with zz
+        under stress control at 0, and answered with four components
     length : characteristic length in m, for laws with damage
     stress : (paths, n) or (n,) stress at the start, default 0
     parts : increments per step
@@ -269,8 +275,13 @@ def follow(
     goal = np.array(targets, dtype=np.float64)
     if goal.ndim == 2:
         goal = goal[None]
+    if goal.ndim == 3 and goal.shape[2] == 3:
+        goal = np.insert(goal, 2, 0.0, axis=2)
+        control = _with_free_zz(control) if isinstance(control, str) else [_with_free_zz(w) for w in control]
+        if stress is not None and np.shape(stress)[-1:] == (3,):
+            stress = np.insert(np.asarray(stress, dtype=np.float64), 2, 0.0, axis=-1)
     if goal.ndim != 3 or goal.shape[2] not in (4, 6) or goal.shape[1] < 1:
-        raise ValueError(f"targets: expected (paths, steps, 4 or 6), found {np.shape(targets)}")
+        raise ValueError(f"targets: expected (paths, steps, 3, 4 or 6), found {np.shape(targets)}")
     paths, steps, n = goal.shape
     count = np.full(paths, steps, np.int64) if rows is None else np.ascontiguousarray(rows, dtype=np.int64)
     if count.shape != (paths,) or count.min() < 1 or count.max() > steps:

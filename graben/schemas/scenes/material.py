@@ -40,10 +40,26 @@ _HARDENING = {
     "hardening_modulus": "Pa",
     "hardening_table": "table",
 }
+_METAL = {
+    "hardening": "word",
+    "initial_yield": "Pa",
+    "hardening_modulus": "Pa",
+    "hardening_gain": "Pa",
+    "hardening_rate": "1",
+    "hardening_table": "table",
+}
 
 UNITS: dict[str, dict[str, str]] = {
     "elastic": {**_ELASTIC},
-    "j2": {**_ELASTIC, "hardening": "table"},
+    "transverse-elastic": {
+        "young_modulus": "Pa",
+        "young_modulus_across": "Pa",
+        "poisson_ratio": "1",
+        "poisson_ratio_across": "1",
+        "shear_modulus_across": "Pa",
+        "axis_angle": "rad",
+    },
+    "j2": {**_ELASTIC, **_METAL},
     "mohr-coulomb": {
         **_ELASTIC,
         "friction_angle": "rad",
@@ -86,6 +102,7 @@ UNITS: dict[str, dict[str, str]] = {
         "split": "word",
         "hardening": "table",
     },
+    "energy-damage": {**_ELASTIC, "damage_threshold": "Pa", "split": "word", "max_damage": "1", **_METAL},
 }
 """law -> parameter -> SI unit, "word" or "table" (plastic strain, stress in Pa). A test holds it to the laws."""
 
@@ -95,6 +112,8 @@ def parameter_to_si(law: str, name: str, value: Any) -> Any:
     unit = UNITS[law].get(name)
     if unit is None:
         raise ValueError(f"a parameter of {law}: {', '.join(UNITS[law])}")
+    if unit == "word" and isinstance(value, list | tuple) and f"{name}_table" in UNITS[law]:
+        unit = "table"  # rows instead of the word "table" with rows elsewhere
     if unit == "word":
         if not isinstance(value, str):
             raise ValueError("a word")
@@ -199,6 +218,8 @@ def material_text(law: str, values: Mapping[str, Any], note: str = "") -> str:
     lines = [f"# {line}" for line in note.splitlines()] + [f'law = "{law}"', "", "[parameters]"]
     for name, value in values.items():
         unit = UNITS[law][name]
+        if unit == "word" and not isinstance(value, str):
+            unit = "table"
         if unit == "word":
             lines.append(f'{name} = "{value}"')
         elif unit == "table":

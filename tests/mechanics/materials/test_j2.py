@@ -1,4 +1,4 @@
-"""J2 with a hardening table against closed forms."""
+"""J2 with its three hardening forms against closed forms."""
 
 from __future__ import annotations
 
@@ -90,3 +90,80 @@ def test_bad_input_leaves_the_point_alone_or_is_refused() -> None:
     for table in ([[0.1, 1e6]], [[0.0, 2e6], [0.1, 1e6]], [[0.0, -1.0]]):
         with pytest.raises(ValueError, match="hardening"):
             pack("j2", {"young_modulus": E, "poisson_ratio": NU, "hardening": table})
+
+
+BASE = {"young_modulus": E, "poisson_ratio": NU, "initial_yield": 380e6}
+FORMS = {
+    "linear": ({"hardening_modulus": 2e9}, lambda p: 380e6 + 2e9 * p),
+    "exponential": (
+        {"hardening_gain": 250e6, "hardening_rate": 40.0},
+        lambda p: 380e6 + 250e6 * (1 - np.exp(-40.0 * p)),
+    ),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("n", [4, 6])
+def test_curves_of_hardening_follow_their_formula(form: str, n: int) -> None:
+    """Uniaxial stress as for the table; and one large radial step reaches the same as many."""
+    values, curve = FORMS[form]
+    par, sig, state = pack("j2", {**BASE, "hardening": form, **values}), np.zeros(n), np.zeros(1)
+    last = np.zeros(n)
+    for p in np.concatenate([[0.0], np.geomspace(1e-6, 1.4, 60)]):
+        strain = np.zeros(n)
+        strain[:3] = curve(p) / E + p, -NU * curve(p) / E - p / 2, -NU * curve(p) / E - p / 2
+        assert update(LAW.id, strain - last, sig, state, par, 1.0, NONE) == 0
+        last = strain
+        assert sig[0] == pytest.approx(curve(p), rel=1e-9)
+        np.testing.assert_allclose(sig[1:], 0.0, atol=1e-9 * curve(p))
+        assert state[0] == pytest.approx(p, abs=1e-12)
+    sig, state = np.zeros(n), np.zeros(1)
+    update(LAW.id, last, sig, state, par, 1.0, NONE)
+    assert state[0] == pytest.approx(1.4, rel=1e-9)
+
+
+def test_a_steep_exponential_returns_from_any_distance() -> None:
+    """q - 3 G dp = s(dp), whatever the rate, the gain and the size of the step."""
+    shear = E / (2 * (1 + NU))
+    rng = np.random.default_rng(2)
+    for _ in range(300):
+        gain, rate, step = 10.0 ** rng.uniform(3, 13), 10.0 ** rng.uniform(-3, 9), 10.0 ** rng.uniform(-2, 0)
+        par = pack("j2", {**BASE, "hardening": "exponential", "hardening_gain": gain, "hardening_rate": rate})
+        sig, state = np.zeros(6), np.zeros(1)
+        assert update(LAW.id, step * np.array([0, 0, 0, 1.0, 0, 0]), sig, state, par, 1.0, NONE) == 0
+        strength = 380e6 + gain * -np.expm1(-rate * state[0])
+        q = np.sqrt(3.0) * shear * step
+        if state[0] > 0:
+            assert np.sqrt(3.0) * sig[3] == pytest.approx(strength, rel=1e-9)
+            assert q - 3 * shear * state[0] == pytest.approx(strength, rel=1e-8, abs=1e-9 * q)
+        else:
+            assert q <= 380e6
+
+
+def test_words_and_rows_mean_the_same_table() -> None:
+    rows = {"young_modulus": E, "poisson_ratio": NU, "hardening": TABLE}
+    words = {**rows, "hardening": "table", "hardening_table": TABLE}
+    assert (pack("j2", rows) == pack("j2", words)).all()
+    with pytest.raises(ValueError, match="initial_yield"):
+        pack("j2", {**BASE, "hardening": TABLE})
+    with pytest.raises(ValueError, match="hardening_modulus"):
+        pack("j2", {**BASE, "hardening": "linear"})
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_tangent_of_the_curves(form: str) -> None:
+    par = pack("j2", {**BASE, "hardening": form, **FORMS[form][0]})
+    rng = np.random.default_rng(5)
+    for _ in range(10):
+        start, d = 200e6 * rng.uniform(-1, 1, 6), 3e-2 * rng.uniform(-1, 1, 6)
+        tangent, numeric = np.zeros((6, 6)), np.zeros((6, 6))
+        update(LAW.id, d, start.copy(), np.array([0.01]), par, 1.0, tangent)
+        for j in range(6):
+            ends = []
+            for h in (1e-7, -1e-7):
+                sig, moved = start.copy(), d.copy()
+                moved[j] += h
+                update(LAW.id, moved, sig, np.array([0.01]), par, 1.0, NONE)
+                ends.append(sig)
+            numeric[:, j] = (ends[0] - ends[1]) / 2e-7
+        np.testing.assert_allclose(tangent, numeric, atol=1e-5 * np.abs(numeric).max())
