@@ -1,8 +1,8 @@
 """The search's own cost beside the model's, for every method; quality for the same budget; JSON lines on stdout.
 
-The model is Drucker-Prager with damage on the UDEC reference curves. `overhead_fraction` is the CPU time that a search
-spends outside of the model, refinement included. Options: --seeds N (3), --particles N (24), --generations N (60),
---increments N between two points (2, as in standard fidelity; 1 as in draft is the cheapest model there is).
+The model is Drucker-Prager with damage on the UDEC reference curves. `overhead_fraction` is the CPU time that a
+search spends outside of the model, refinement included. Options: --seeds N (3), --particles N (24), --generations N
+(60), --increments N between two points (2, as in standard fidelity; 1, as in draft, is the cheapest model there is).
 """
 
 from __future__ import annotations
@@ -65,7 +65,8 @@ def main() -> None:
             figures.append((1.0 - inside / spent, spent, found.evaluations, found.best.value, rmse))
         overhead, spent, evaluations, value, rmse = np.array(figures).T
         tell(
-            f"one start, {method}", increments=options.increments, overhead_fraction=float(np.median(overhead)), cpu_s=float(np.median(spent)),
+            f"one start, {method}", increments=options.increments,
+            overhead_fraction=float(np.median(overhead)), cpu_s=float(np.median(spent)),
             evaluations=int(np.median(evaluations)), objective_median=float(np.median(value)),
             objective_worst=float(value.max()), rmse_mpa_median=float(np.median(rmse)) / 1e6,
             rmse_mpa_worst=float(rmse.max()) / 1e6,

@@ -12,6 +12,7 @@ from graben.mechanics.materials.laws import LAWS
 from graben.mechanics.search.curves import Curve, CurveFit
 from graben.mechanics.search.identifiability import Identifiability
 from graben.mechanics.search.multistart import Found
+from graben.mechanics.search.space import Box
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.stages.calibrate_compare import Candidate
 from graben.stages.calibrate_problem import Problem
@@ -46,6 +47,7 @@ def arrays_of(
         data["stress_measured"][i, :r], data["strain_measured"][i, :r] = c.stress, c.strain
         data["stress"][i, :r], data["strain"][i, :r] = predicted.stress[0, i, :r], predicted.strain[0, i, :r]
         band[:, i, :r] = predicted.stress[1:, i, :r, 1]
+    scatter = _prediction_error(whole, box, box.to_unit(values), known, errors["stress"], shape)
     slope = box.slope(box.to_unit(values))
     unit = box.to_unit(values)
     bound = np.where(unit <= 1e-6, -1, np.where(unit >= 1.0 - 1e-6, 1, 0))
@@ -77,6 +79,7 @@ def arrays_of(
         "member_objective": fit.objective(sets[1:]),
         "member_stress_rmse": np.array([fit.errors(v)["stress"] for v in sets[1:]]),
         "member_axial_stress": band,
+        "axial_stress_error": scatter,
         "history": found.history,
     }
     if holdout is not None:
@@ -91,6 +94,29 @@ def arrays_of(
                 [np.concatenate([c.holdout, np.full(len(unseen), np.nan)]) for c in candidates]
             ),
         }
+    return out
+
+
+def _prediction_error(
+    fit: CurveFit, box: Box, unit: np.ndarray, known: Identifiability, rmse: float, shape: tuple[int, ...]
+) -> np.ndarray:
+    """Standard deviation (curve, step) of a measured axial stress about the prediction: what the parameters leave
+    open, to first order (correlation, robust errors), and the misfit of the fitted curves."""
+    free = np.flatnonzero(known.free)
+    step = 1e-4
+    up, down = np.repeat(unit[None], free.size, axis=0), np.repeat(unit[None], free.size, axis=0)
+    row = np.arange(free.size)
+    up[row, free], down[row, free] = np.minimum(unit[free] + step, 1.0), np.maximum(unit[free] - step, 0.0)
+    out = np.full(shape[:2], np.nan)
+    variance = np.zeros(shape[:2])
+    if free.size:
+        high, low = (fit.predict(box.to_values(u)).stress[..., 1] for u in (up, down))
+        change = (high - low) / (up[row, free] - down[row, free])[:, None, None]
+        error = known.robust_error[free]
+        covariance = known.correlation[np.ix_(free, free)] * np.outer(error, error)
+        variance = np.einsum("ics,ij,jcs->cs", change, covariance, change)
+    for i, c in enumerate(fit.curves):
+        out[i, : len(c.stress)] = np.sqrt(np.maximum(variance[i, : len(c.stress)], 0.0) + rmse**2)
     return out
 
 
@@ -132,6 +158,9 @@ def headline_of(
         each = arrays["stress_rmse"][len(measured) :]
         points = np.array([len(c.stress) for c in unseen])
         out["validation_rmse_pa"] = float(np.sqrt(np.sum(each**2 * points) / points.sum()))
+        gap = np.abs(arrays["stress"] - arrays["stress_measured"])[len(measured) :, :, 1]
+        inside = gap <= 1.96 * arrays["axial_stress_error"][len(measured) :]
+        out["validation_inside_95_band"] = float(inside[np.isfinite(gap)].mean())
         out["validation_curve_rmse_pa"] = {c.name: float(e) for c, e in zip(unseen, each)}
     return out
 

@@ -87,8 +87,12 @@ def test_command_prints_json_and_validates_on_curves_it_did_not_fit(tmp_path):
     assert set(headline["curve_rmse_pa"]) == {"0.5 MPa", "1 MPa", "4 MPa"}
     assert set(headline["validation_curve_rmse_pa"]) == {"2 MPa"}
     assert headline["validation_rmse_pa"] > 0
+    assert 0.0 <= headline["validation_inside_95_band"] <= 1.0
     with xarray.open_dataset(out) as data:
         assert data["role"].values.tolist() == ["fit", "fit", "fit", "validation"]
+        band = data["axial_stress_error"].values
+        assert (band[np.isfinite(band)] >= headline["rmse_pa"]).all()
+        assert np.isfinite(band).sum(axis=1).tolist() == data["step_count"].values.tolist()
 
 
 def test_cross_validation_reports_each_curve(tmp_path):

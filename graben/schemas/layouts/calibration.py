@@ -98,6 +98,13 @@ LAYOUT = Layout(
         "member_objective": Variable(("member",), "1", "objective of each set"),
         "member_stress_rmse": Variable(("member",), "Pa", "axial-stress error of each set over the fitted curves"),
         "member_axial_stress": Variable(_BAND, "Pa", "axial stress of each set: a band", may_be_nan=True),
+        "axial_stress_error": Variable(
+            ("curve", "step"),
+            "Pa",
+            "standard deviation of the measured axial stress about the law's: parameters and misfit",
+            optional=True,
+            may_be_nan=True,
+        ),
         "history": Variable(("generation",), "1", "best objective of the global search"),
     },
 )

@@ -36,6 +36,9 @@ def _curves(data: Any, axes: Any, lateral: bool) -> None:
             y, z = 100.0 * measured[i, :n, 0], 100.0 * law[i, :n, 0]
         else:
             y, z = (-1e-6 * data[k].values[i, :n, 1] for k in ("stress_measured", "stress"))
+            if not fitted and "axial_stress_error" in data:
+                reach = 1.96e-6 * data["axial_stress_error"].values[i, :n]
+                axes.fill_between(x, z - reach, z + reach, color=colour, alpha=0.12, lw=0)
             if len(band) > 1:
                 b = -1e-6 * band[:, i, :n]
                 axes.fill_between(x, b.min(axis=0), b.max(axis=0), color=colour, alpha=0.2, lw=0)
@@ -47,7 +50,9 @@ def _curves(data: Any, axes: Any, lateral: bool) -> None:
         "lateral strain, % (extension positive)" if lateral else "axial stress, MPa (compression positive)"
     )
     axes.set_title(
-        "lateral strain" if lateral else "points: curves; lines: law; band: near-optimal sets",
+        "lateral strain"
+        if lateral
+        else "points: curves; lines: law; bands: near-optimal sets, 95 % where not fitted",
         fontsize=10,
         loc="left",
     )
