@@ -23,17 +23,15 @@ from graben.schemas.scenes.rev_study import RevStudyScene
 from graben.stages.record import Progress
 from graben.stages.workers import compute
 
-# The one fit that all samples begin with, and then that of each sample: it need not search far.
+# The one fit that all samples begin with.
 _FIRST = {
     "draft": Plan(starts=1, particles=24, generations=60),
     "standard": Plan(starts=2, particles=24, generations=100),
     "reference": Plan(starts=4, particles=48, generations=200, refine_best=4),
 }
-_EACH = {
-    "draft": Plan(starts=1, particles=8, generations=0, refine_best=1, iterations=20),
-    "standard": Plan(starts=1, particles=12, generations=10, refine_best=2, iterations=40),
-    "reference": Plan(starts=1, particles=24, generations=40, refine_best=3, iterations=40),
-}
+# Then each sample refines the best sets of that one (how many, iterations). Nothing random takes part: a swarm of its
+# own for each sample ends in other basins that fit as well, and that would pass for scatter of the rock.
+_EACH = {"draft": (1, 20), "standard": (3, 40), "reference": (6, 80)}
 
 
 @dataclass(frozen=True)
@@ -140,12 +138,10 @@ def fit_samples(
         best.x, best.residuals, jacobian(lambda u: fit.residuals(box.to_values(u)), best.x, 1e-4),
         groups=fit.groups, lag=first.lag,
     )  # fmt: skip
-    tasks = [
-        task(r, c, runs, _EACH[scene.fidelity], found.members[:3])
-        for r in range(radii)
-        for c in range(centres)
-        for runs in groups
-    ]
+    sets, iterations = _EACH[scene.fidelity]
+    guesses = found.members[:sets]
+    each = Plan(starts=1, particles=len(guesses), generations=0, refine_best=len(guesses), iterations=iterations)
+    tasks = [task(r, c, runs, each, guesses) for r in range(radii) for c in range(centres) for runs in groups]
     results = compute(fit_sample, tasks, processes, lambda f: progress(0.1 + 0.9 * f, "calibrating"), cluster=cluster)
     shape = (radii, centres, len(groups))
     return Fits(

@@ -228,7 +228,8 @@ def recommend(radii: Floats, by_name: dict[str, Convergence], independent: Float
             scatter = c.deviation[k] / abs(c.mean[k]) if c.mean[k] != 0.0 else np.inf
             why = (
                 f"{last} has not settled at the largest radius, {radii[k]:g} m: its scatter is not shown to be "
-                f"small (coefficient of variation {scatter:.3f}, {int(c.count[k])} samples)"
+                f"small (coefficient of variation {scatter:.3f}, {int(c.count[k])} samples worth "
+                f"{independent[k]:.1f} independent ones)"
             )
         else:
             why = f"{last} still changes between {radii[k - 1]:g} m and the largest radius, {radii[k]:g} m"
