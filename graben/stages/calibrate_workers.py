@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 
-from graben.stages.workers import _PATIENCE_S, _await_worker, _client
+from graben.stages.workers import PATIENCE_S, await_worker, connect
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ def workers_of(search: str, workers: int, particles: int, cluster: str | None) -
     Two tasks for each worker and generation: fewer leave workers idle, more cost more than they share out.
     """
     if cluster is not None:
-        client = _client(cluster, _PATIENCE_S)
+        client = connect(cluster, PATIENCE_S)
         with client:
-            _await_worker(client, cluster, _PATIENCE_S)
+            await_worker(client, cluster, PATIENCE_S)
             lanes = max(1, sum(client.nthreads().values()))
             yield Workers(client.get_executor(pure=False), math.ceil(particles / (2 * lanes)))
     elif search == "appso" and workers > 1:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Done = Callable[[float], None]
 
 _ATTEMPTS = 3
-_PATIENCE_S = 60.0  # a cluster without any worker for so long is given up
+PATIENCE_S = 60.0  # a cluster without any worker for so long is given up
 
 
 def compute(
@@ -29,7 +29,7 @@ def compute(
     done: Done = lambda fraction: None,
     *,
     cluster: str | None = None,
-    patience_s: float = _PATIENCE_S,
+    patience_s: float = PATIENCE_S,
 ) -> list[Any]:
     """`work` of every task, in the order of the tasks.
 
@@ -84,12 +84,12 @@ def _on_cluster(
     work: Callable[[Any], Any], tasks: Sequence[Any], done: Done, address: str, patience_s: float
 ) -> list[Any]:
     """The scheduler gives the tasks of a lost worker to another; one that killed its workers is asked for again."""
-    client = _client(address, patience_s)
+    client = connect(address, patience_s)
     from distributed import KilledWorker, wait
 
     results: dict[int, Any] = {}
     with client:
-        _await_worker(client, address, patience_s)
+        await_worker(client, address, patience_s)
         asked = dict.fromkeys(range(len(tasks)), 1)
         # One by one, so that tasks need not be hashable, and none is taken for another (pure).
         futures = {k: client.submit(work, task, pure=False) for k, task in enumerate(tasks)}
@@ -97,7 +97,7 @@ def _on_cluster(
             try:
                 wait(list(futures.values()), timeout=patience_s, return_when="FIRST_COMPLETED")
             except TimeoutError:
-                _await_worker(client, address, patience_s)  # slow tasks are no fault, no worker is
+                await_worker(client, address, patience_s)  # slow tasks are no fault, no worker is
                 continue
             for k in [k for k, future in futures.items() if future.done()]:
                 try:
@@ -112,7 +112,7 @@ def _on_cluster(
     return [results[k] for k in range(len(tasks))]
 
 
-def _client(address: str, patience_s: float) -> Client:
+def connect(address: str, patience_s: float) -> Client:
     try:
         from distributed import Client
     except ModuleNotFoundError as error:
@@ -125,7 +125,7 @@ def _client(address: str, patience_s: float) -> Client:
         raise BadInput(Fault("--cluster", "", address, expected)) from None
 
 
-def _await_worker(client: Client, address: str, patience_s: float) -> None:
+def await_worker(client: Client, address: str, patience_s: float) -> None:
     try:
         client.wait_for_workers(1, timeout=patience_s)
     except (TimeoutError, OSError):

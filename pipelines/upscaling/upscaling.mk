@@ -7,6 +7,9 @@ CONFINING    ?= 0.5 1 2 4
 UP_RADIUS    ?= 4 m
 UP_RUNS      := $(CONFINING:%=$(UP)/blocks-%MPa.nc)
 UP_CURVES    := $(CONFINING:%=$(UP)/curves-%MPa.nc)
+# A representative size needs several tessellations: the first confinement again with other seeds than the scene's own.
+UP_SEEDS     ?= 2 3
+UP_REV_RUNS  := $(firstword $(UP_RUNS)) $(UP_SEEDS:%=$(UP)/blocks-seed%.nc)
 UP_PICTURES  := $(UP)/blocks-$(firstword $(CONFINING))MPa.png $(UP)/rev-study.png \
                 $(UP)/calibration.png $(UP)/calibration-udec.png $(UP)/slope.png
 UP_ARTIFACTS := $(UP_RUNS) $(UP_CURVES) $(UP)/rev-study.nc $(UP)/calibration.nc $(UP)/calibration-udec.nc $(UP)/slope.nc
@@ -34,8 +37,12 @@ $(UP)/blocks-%MPa.nc: $(UP_SCENES)/voronoi-granite.toml $(UP)/.fidelity | $(READ
 $(UP)/curves-%MPa.nc: $(UP)/blocks-%MPa.nc
 	$(call stage,homogenize $< --radius "$(UP_RADIUS)")
 
-$(UP)/rev-study.nc: $(UP_SCENES)/rev-study.toml $(UP)/blocks-$(firstword $(CONFINING))MPa.nc
-	$(call stage,rev-study $(UP)/blocks-$(firstword $(CONFINING))MPa.nc --scene $<)
+$(UP)/blocks-seed%.nc: $(UP_SCENES)/voronoi-granite.toml $(UP)/.fidelity | $(READY)
+	$(call stage,dem-run $< --set fidelity=$(FIDELITY) --set seed=$* --set output.vtk=false \
+	  --set 'loading.confining_pressure="$(firstword $(CONFINING)) MPa"')
+
+$(UP)/rev-study.nc: $(UP_SCENES)/rev-study.toml $(UP_REV_RUNS)
+	$(call stage,rev-study $(UP_REV_RUNS) --scene $<)
 
 $(UP)/calibration.nc: $(UP_SCENES)/calibrate.toml $(UP_CURVES)
 	$(call stage,calibrate $< $(UP_CURVES) --set fidelity=$(FIDELITY))
