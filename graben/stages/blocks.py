@@ -66,7 +66,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         raise BadInput(Fault(str(scene.source.path), "", "", f"a scene that can be run ({error})")) from error
     progress(0.0, f"{tessellation.size} blocks come to rest")
     if parts is None:
-        test.begin()
+        test.begin(progress)
     else:
         _bring_back(blocks_checkpoint.path_for(output), model, test, parts)
     history = History(model)
@@ -144,6 +144,10 @@ def _model(scene: BlocksScene, tessellation: Tessellation, dt: float, gravity: t
         j.tension,
         float(np.tan(j.dilation)),
         np.inf if j.dilation_limit is None else j.dilation_limit,
+        # Negative: as for intact joints.
+        -1.0 if j.residual_friction is None else float(np.tan(j.residual_friction)),
+        -1.0 if j.residual_cohesion is None else j.residual_cohesion,
+        j.closure or 0.0,
     )
     return BlockModel(
         build_bodies(tessellation, scene.tessellation.zone_edge),
@@ -155,6 +159,7 @@ def _model(scene: BlocksScene, tessellation: Tessellation, dt: float, gravity: t
         dt=dt,
         gravity=gravity,
         damping=Damping(ratio=scene.numerics.damping_ratio),
+        threads=scene.numerics.threads,
     )
 
 

@@ -28,8 +28,9 @@ class Biaxial:
         self.scene, self.model, self.steps = scene, model, steps
         self.rest = np.zeros(2)  # unbalanced force ratio of consolidation, its steps
 
-    def begin(self) -> None:
+    def begin(self, progress: Progress) -> None:
         """Consolidate."""
+        progress(0.0, "consolidation")
         pressure = self.scene.loading.confining_pressure
         ratio = consolidate(
             self.model,

@@ -50,9 +50,13 @@ class Rising:
             model.skeleton.steady[:] += load.pressure * unit
             self._rising += load.rate * unit
 
-    def begin(self) -> None:
+    def begin(self, progress: Progress) -> None:
         """Bring the body to rest under its weight and steady pressures."""
-        ratio = mechanics.come_to_rest(self.model, self.scene.numerics.consolidation_tolerance)
+        ratio = mechanics.come_to_rest(
+            self.model,
+            self.scene.numerics.consolidation_tolerance,
+            lambda ratio, steps: progress(0.0, f"coming to rest, {steps} steps, unbalanced force ratio {ratio:.2g}"),
+        )
         self.rest = np.array([ratio, self.model.steps_done])
         self.carried = self.model.motion.x.copy()
 

@@ -110,6 +110,28 @@ def test_same_scene_same_arrays(scene, finished):
             assert np.array_equal(a[name].values, b[name].values), name
 
 
+@pytest.mark.parametrize(
+    ("setting", "stronger"),
+    [
+        ('joints.residual_friction="15 deg"', False),
+        ('joints.residual_cohesion="0 Pa"', False),
+        ('joints.closure="0.2 mm"', True),
+    ],
+)
+def test_options_of_joints_reach_the_model(scene, finished, setting, stronger):
+    output = scene.with_name("option.nc")
+    run = dem_run.run(scene, output, overrides=["output.vtk=false", setting], overwrite=True)
+    # Compression is negative.
+    assert (run["peak_wall_stress_pa"] < finished[1]["peak_wall_stress_pa"]) == stronger
+
+
+def test_threads_change_nothing(scene, finished):
+    output = scene.with_name("threads.nc")
+    dem_run.run(scene, output, overrides=["output.vtk=false", "numerics.threads=2"])
+    with xarray.open_dataset(finished[0]) as a, xarray.open_dataset(output) as b:
+        assert np.array_equal(a.displacement.values, b.displacement.values)
+
+
 def test_picture(finished):
     output = finished[0].with_name("run.png")
     picture.run(finished[0], output)

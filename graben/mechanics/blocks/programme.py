@@ -6,6 +6,7 @@ as the blocks keep up, wait while they do not, and the rock has failed when wait
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,8 +74,17 @@ def imbalance(model: BlockModel) -> float:
     return float(np.hypot(*total.T).mean()) / scale if scale > 0.0 else np.inf
 
 
-def come_to_rest(model: BlockModel, tolerance: float, *, chunk: int = 250, limit: int = 100_000) -> float:
+def come_to_rest(
+    model: BlockModel,
+    tolerance: float,
+    tell: Callable[[float, int], None] = lambda ratio, steps: None,
+    *,
+    chunk: int = 250,
+    limit: int = 100_000,
+) -> float:
     """Step under the loads as they are until `imbalance` falls below `tolerance`; returns what it reached.
+
+    tell : gets the imbalance and the number of steps after every chunk
 
     Raises NumericsFailed when it does not within `limit` steps: the body does not stand.
     """
@@ -83,6 +93,7 @@ def come_to_rest(model: BlockModel, tolerance: float, *, chunk: int = 250, limit
     for _ in range(0, limit, chunk):
         model.advance(chunk)
         ratio = imbalance(model)
+        tell(ratio, model.steps_done)
         if ratio < tolerance:
             model.damping = damping
             return ratio

@@ -112,6 +112,16 @@ class Joints(Model):
     tension: Pressure = key("0 Pa", "tensile strength, lost once broken", ge=0)
     dilation: Angle = key("5 deg", "dilation angle", ge=0, lt=1.57)
     dilation_limit: Length | None = key(None, "net slip at which dilation stops; left out: never", gt=0)
+    residual_friction: Angle | None = key(
+        None, "friction once a joint has broken, by slip or in tension; left out: as before", ge=0, lt=1.57
+    )
+    residual_cohesion: Pressure | None = key(None, "cohesion once a joint has broken; left out: as before", ge=0)
+    closure: Length | None = key(
+        None,
+        "largest closure of joints that stiffen as they close, from normal_stiffness on (Barton and Bandis); "
+        "left out: linear",
+        gt=0,
+    )
 
 
 class Loading(Model):
@@ -180,6 +190,9 @@ class Numerics(Model):
     damping_ratio: float = key(0.5, "power of the adaptive damping over the rate of kinetic energy", gt=0)
     consolidation_tolerance: float = key(1e-3, "unbalanced over mean zone force that ends consolidation", gt=0)
     energy_limit: float = key(0.05, "largest error of the energy ledger over the work done", gt=0)
+    threads: int = key(
+        1, "threads that share a run out, with bitwise the same result; pays from 2000 blocks on", ge=1
+    )
 
 
 class Output(Model):
