@@ -189,7 +189,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bits(cluster, method, tmp_
 
 
 def test_no_cluster_is_a_fault(tmp_path, monkeypatch):
-    monkeypatch.setattr("graben.stages.calibrate_workers._PATIENCE_S", 1.0)
+    monkeypatch.setattr("graben.stages.calibrate_workers.PATIENCE_S", 1.0)
     with pytest.raises(BadInput, match="--cluster"):
         calibrate.run(SCENE, tmp_path / "o.nc", overrides=QUICK, cluster="tcp://127.0.0.1:9")
 
