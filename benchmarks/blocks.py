@@ -1,7 +1,8 @@
 """Speed of the block model: zone-steps per second and cost per block, one thread, as JSON lines on stdout.
 
 Voronoi granite of growing size, squeezed so that joints slide, contacts and their search included. Options:
---sizes EDGE ... (domain edges in m: 10 20), --steps N (2000).
+--sizes EDGE ... (domain edges in m: 10 20), --steps N (2000), --threads N ... (1), --features (what each feature of
+joints costs: median of five rounds, in turn, of runs with it and without).
 """
 
 from __future__ import annotations
@@ -20,27 +21,74 @@ from graben.mechanics.blocks.joints import Joint
 from graben.mechanics.blocks.model import BlockModel
 from graben.mechanics.blocks.tessellation import voronoi_blocks
 
+PLAIN = Joint(1e10, 1e9, np.tan(np.radians(32)), 1e5, 0.0, 0.0, np.inf)
+FEATURES = {
+    "plain": (PLAIN,),
+    "plain again": (PLAIN,),
+    "dilation": (PLAIN._replace(dilation=np.tan(np.radians(5))),),
+    "dilation that stops": (PLAIN._replace(dilation=np.tan(np.radians(5)), dilation_limit=5e-3),),
+    "tension": (PLAIN._replace(tension=1e5),),
+    "residual strength": (PLAIN._replace(residual_friction=0.5, residual_cohesion=0.0),),
+    "stiffening": (PLAIN._replace(closure=1e-3),),
+    "two sets": (PLAIN, PLAIN),
+}
 
-def granite(size: float, dilation: float) -> BlockModel:
-    """A square of Voronoi granite after consolidation, its top moving down."""
+
+def granite(size: float, dilation: float, joints: tuple[Joint, ...] = (), threads: int = 1) -> BlockModel:
+    """A square of Voronoi granite after consolidation, its top moving down; with several sets, edges take turns."""
     outline = size * np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
     bodies = build_bodies(voronoi_blocks(outline, 0.5, seed=1))
-    joint = Joint(1e10, 1e9, np.tan(np.radians(32)), 1e5, 0.0, np.tan(np.radians(dilation)), np.inf)
-    model = BlockModel(bodies, young=65e9, poisson=0.2, density=2700.0, joint=joint, rounding=0.05, dt=2e-3)
-    consolidate(model, -0.5e6, -0.25e6, tolerance=1e-2)
-    model.hold(bodies.vertex_side[:, 2], 1, -0.0005 * size)
+    sets = joints or (PLAIN._replace(dilation=np.tan(np.radians(dilation))),)
+    model = BlockModel(
+        bodies,
+        young=65e9,
+        poisson=0.2,
+        density=2700.0,
+        joint=sets[0],
+        more_joints=sets[1:],
+        edge_set=np.arange(len(bodies.edge_from)) % len(sets),
+        rounding=0.05,
+        dt=2e-3,
+        threads=threads,
+    )
+    consolidate(model, -0.5e6, -0.25e6, tolerance=5e-2)
+    # The same motion per step whatever the size: step costs compare.
+    model.hold(bodies.vertex_side[:, 2], 1, -0.005)
     model.motion.drive[rx.SPEED] = 1.0
     return model
+
+
+def feature_costs(size: float, steps: int) -> None:
+    """Step cost with each feature on, over that of plain joints."""
+    models = {name: granite(size, 0.0, joints) for name, joints in FEATURES.items()}
+    spent: dict[str, list[float]] = {name: [] for name in models}
+    for _ in range(5):
+        for name, model in models.items():
+            cpu = time.process_time()
+            model.advance(steps)
+            spent[name].append(time.process_time() - cpu)
+    plain = np.array(spent["plain"])
+    for name, model in models.items():
+        ratio = float(np.median(np.array(spent[name]) / plain))
+        blocks = len(model.bodies.block_area)
+        line = {"benchmark": "blocks features", "feature": name, "blocks": blocks, "cost_over_plain": round(ratio, 3)}
+        line["ns_per_block_step"] = round(1e9 * float(np.median(spent[name])) / steps / blocks, 1)
+        print(json.dumps(line), flush=True)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sizes", type=float, nargs="+", default=[10.0, 20.0])
     parser.add_argument("--steps", type=int, default=2000)
+    parser.add_argument("--threads", type=int, nargs="+", default=[1])
+    parser.add_argument("--features", action="store_true")
     options = parser.parse_args()
+    if options.features:
+        feature_costs(options.sizes[0], options.steps)
+        return
     for size in options.sizes:
-        for dilation in (0.0, 5.0):
-            model = granite(size, dilation)
+        for dilation, threads in ((d, t) for d in (0.0, 5.0) for t in options.threads):
+            model = granite(size, dilation, threads=threads)
             model.advance(options.steps)
             searches, wall, cpu = model.rebuilds, time.perf_counter(), time.process_time()
             model.advance(options.steps)
@@ -59,7 +107,8 @@ def main() -> None:
                         "zone_steps_per_cpu_s": round(zones * options.steps / cpu),
                         "ns_per_block_step": round(1e9 * cpu / options.steps / blocks, 1),
                         "candidates": len(model.pairs.key),
-                        "active": int(model.motion.active_count[0]),
+                        "active": int((model.motion.turn[:, -1] - model.motion.turn[:, 0]).sum()),
+                        "threads": threads,
                         "contact_searches": model.rebuilds - searches,
                         "machine": platform.machine(),
                         "python": platform.python_version(),

@@ -12,6 +12,7 @@ from graben.mechanics.blocks import search, zones
 from graben.mechanics.blocks.bodies import Bodies, Skin, chamfered_skin
 from graben.mechanics.blocks.joints import (
     COLUMNS,
+    OPEN,
     RIM,
     RIM_SHARE,
     STICK,
@@ -332,6 +333,33 @@ class BlockModel:
         out, ints = np.zeros((n, 11)), np.zeros((n, 2), dtype=np.int64)
         count, stored = contact_state(self.pairs, s.follow, m.node, self.joint_table, self.deepest, out, ints)
         return out[:count], ints[:count], stored
+
+    def loose_blocks(self) -> np.ndarray:
+        """Mask (blocks,) of those that touch no other block and are held by nothing."""
+        _, ints, _ = self.contacts()
+        pair = ints[ints[:, 1] != OPEN, 0]
+        fixed = np.zeros(len(self.bodies.block_area), dtype=bool)
+        fixed[self.skin.block[self.pairs.first[pair]]] = True
+        fixed[self.skin.block[self.pairs.second[pair]]] = True
+        fixed[self.bodies.vertex_block[self.held.any(axis=1)]] = True
+        return ~fixed
+
+    def kinetic_energy(self, blocks: np.ndarray) -> float:
+        """Kinetic energy [J/m] of the blocks of a mask (blocks,); for instance of all that are not loose."""
+        there = blocks[self.bodies.vertex_block]
+        return float(0.5 * (self.skeleton.mass[there, None] * self.motion.v[there] ** 2).sum())
+
+    def calm_loose_blocks(self) -> np.ndarray:
+        """Stop the loose blocks where they are; what they moved with counts as damped. Returns their mask.
+
+        For slow loading without gravity, where a block that is pressed out flies on for ever.
+        """
+        loose = self.loose_blocks()
+        energy = self.kinetic_energy(loose)
+        self.motion.v[loose[self.bodies.vertex_block]] = 0.0
+        self.motion.tally[rx.KINETIC] -= energy
+        self.motion.tally[rx.DAMPED] += energy
+        return loose
 
     def energies(self) -> dict[str, float]:
         """Energy ledger [J per m of thickness]; error = work put in - everything accounted for."""

@@ -172,6 +172,31 @@ def test_consolidation_that_cannot_end_says_so():
         consolidate(model, -0.5e6, -0.25e6, limit=250)
 
 
+def test_loose_blocks_are_found_and_stopped():
+    # Two blocks rest on each other, a third flies off.
+    shapes = [rectangle(0, 0, 1, 1), rectangle(0, 1, 1, 2), rectangle(1.2, 1, 2.2, 2)]
+    bodies = build_bodies(from_polygons(shapes, rectangle(0, 0, 2.2, 2)))
+    joint = Joint(1e9, 1e9, 0.6, 0.0, 0.0, 0.0, np.inf)
+    model = BlockModel(
+        bodies, young=1e9, poisson=0.2, density=2500.0, joint=joint, rounding=0.02, damping=Damping(ratio=-1.0)
+    )
+    model.hold(bodies.vertex_block == 0, 1)
+    model.motion.v[bodies.vertex_block == 2, 0] = 0.5
+    model.motion.v[bodies.vertex_block == 1, 1] = -0.01
+    model.advance(4)
+    loose = model.loose_blocks()
+    assert loose.tolist() == [False, False, True]
+    assert model.kinetic_energy(loose) == pytest.approx(0.5 * 2500.0 * 0.25, rel=1e-9)
+    before = model.energies()
+    model.calm_loose_blocks()
+    after = model.energies()
+    assert model.kinetic_energy(loose) == 0.0
+    assert after["error"] == pytest.approx(before["error"], abs=1e-9)
+    place = model.motion.x[bodies.vertex_block == 2].copy()
+    model.advance(100)
+    assert model.motion.x[bodies.vertex_block == 2] == pytest.approx(place, rel=0, abs=1e-12)
+
+
 def test_wrong_properties_are_refused():
     bodies = build_bodies(voronoi_blocks(rectangle(0, 0, 2, 2), 0.5, seed=1))
     joint = Joint(1e10, 1e9, 0.6, 1e5, 0.0, 0.0, np.inf)
