@@ -60,7 +60,7 @@ def return_to_table(q_trial, p, three_g, par, start, scale):
         high = scale * par[i + 2 * k + 1]
         if q_trial - three_g * (right - p) <= high:
             slope = (high - low) / (right - left)
-            return (q_trial - low + three_g * p + slope * left) / (three_g + slope) - p, slope
+            return (q_trial - low + slope * (left - p)) / (three_g + slope), slope
         left, low = right, high
     return (q_trial - low) / three_g, 0.0
 
