@@ -11,48 +11,47 @@ from graben.schemas.vtk import VtuSeries
 
 def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
     """Zones in NAME.pvd, contacts as lines in NAME-joints.pvd, one VTU a state each."""
-    zones, joints = VtuSeries(output), VtuSeries(output.with_name(output.stem + "-joints.nc"))
     reference = arrays["vertex_position"]
     end = np.concatenate([[0], np.cumsum(arrays["contact_count"])])
-    for k, time in enumerate(arrays["time"]):
-        stress = arrays["zone_stress"][k]
-        tensor = np.zeros((len(stress), 6))
-        tensor[:, [0, 1, 2, 3]] = stress
-        centre = 0.5 * (stress[:, 0] + stress[:, 1])
-        radius = np.hypot(0.5 * (stress[:, 0] - stress[:, 1]), stress[:, 3])
-        zones.add(
-            time,
-            reference + arrays["displacement"][k],
-            {"triangle": arrays["zone_vertex"]},
-            {
-                "displacement": arrays["displacement"][k],
-                "velocity": arrays["velocity"][k],
-                "boundary_force": arrays["boundary_force"][k],
-            },
-            {
-                "stress": tensor,
-                "stress_major_compressive": centre - radius,
-                "stress_minor_compressive": centre + radius,
-                "block": arrays["zone_block"],
-            },
-        )
-        part = slice(end[k], end[k + 1])
-        n = int(end[k + 1] - end[k])
-        half = 0.5 * arrays["contact_length"][part, None] * arrays["contact_tangent"][part]
-        middle = arrays["contact_position"][part]
-        joints.add(
-            time,
-            np.vstack([middle - half, middle + half]),
-            {"line": np.column_stack([np.arange(n), np.arange(n) + n])},
-            None,
-            {
-                "state": arrays["contact_state"][part].astype(np.int32),
-                "slip": arrays["contact_slip"][part],
-                "opening": arrays["contact_opening"][part],
-                "normal_stress": arrays["contact_normal_stress"][part],
-                "shear_stress": arrays["contact_shear_stress"][part],
-                "force": arrays["contact_force"][part],
-            },
-        )
-    zones.close()
-    joints.close()
+    beside = output.with_name(output.stem + "-joints.nc")
+    with VtuSeries(output) as zones, VtuSeries(beside) as joints:
+        for k, time in enumerate(arrays["time"]):
+            stress = arrays["zone_stress"][k]
+            tensor = np.zeros((len(stress), 6))
+            tensor[:, [0, 1, 2, 3]] = stress
+            centre = 0.5 * (stress[:, 0] + stress[:, 1])
+            radius = np.hypot(0.5 * (stress[:, 0] - stress[:, 1]), stress[:, 3])
+            zones.add(
+                time,
+                reference + arrays["displacement"][k],
+                {"triangle": arrays["zone_vertex"]},
+                {
+                    "displacement": arrays["displacement"][k],
+                    "velocity": arrays["velocity"][k],
+                    "boundary_force": arrays["boundary_force"][k],
+                },
+                {
+                    "stress": tensor,
+                    "stress_major_compressive": centre - radius,
+                    "stress_minor_compressive": centre + radius,
+                    "block": arrays["zone_block"],
+                },
+            )
+            part = slice(end[k], end[k + 1])
+            n = int(end[k + 1] - end[k])
+            half = 0.5 * arrays["contact_length"][part, None] * arrays["contact_tangent"][part]
+            middle = arrays["contact_position"][part]
+            joints.add(
+                time,
+                np.vstack([middle - half, middle + half]),
+                {"line": np.column_stack([np.arange(n), np.arange(n) + n])},
+                None,
+                {
+                    "state": arrays["contact_state"][part].astype(np.int32),
+                    "slip": arrays["contact_slip"][part],
+                    "opening": arrays["contact_opening"][part],
+                    "normal_stress": arrays["contact_normal_stress"][part],
+                    "shear_stress": arrays["contact_shear_stress"][part],
+                    "force": arrays["contact_force"][part],
+                },
+            )

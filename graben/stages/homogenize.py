@@ -229,7 +229,6 @@ def curve_arrays(jobs: Sequence[tuple[Run, Rev]], averages: Sequence[Average]) -
 
 def _write_vtk(output: Path, jobs: Sequence[tuple[Run, Rev]], averages: Sequence[Average]) -> None:
     """Outlines of all paths as closed lines, state by state; each line carries the averages of its path."""
-    series = VtuSeries(output)
     moving = [a.outline.follow(j.history.current) for (j, _), a in zip(jobs, averages)]
     sizes = [nodes.shape[1] for nodes in moving]
     starts = np.concatenate([[0], np.cumsum(sizes)])
@@ -240,21 +239,21 @@ def _write_vtk(output: Path, jobs: Sequence[tuple[Run, Rev]], averages: Sequence
         ]
     )
     longest = max(range(len(jobs)), key=lambda k: moving[k].shape[0])
-    for step, time in enumerate(jobs[longest][0].history.time):
-        # A run that ended earlier keeps its last state.
-        now = [min(step, nodes.shape[0] - 1) for nodes in moving]
-        tensors = {}
-        for name in ("stress", "strain"):
-            values = np.array([getattr(a, name)[k] for a, k in zip(averages, now)])
-            tensors[name] = np.repeat(np.hstack([values, np.zeros((len(now), 2))]), sizes, axis=0)
-        series.add(
-            float(time),
-            np.concatenate([nodes[k] for nodes, k in zip(moving, now)]),
-            {"line": lines},
-            None,
-            {"path": np.repeat(np.arange(len(now)), sizes), **tensors},
-        )
-    series.close()
+    with VtuSeries(output) as series:
+        for step, time in enumerate(jobs[longest][0].history.time):
+            # A run that ended earlier keeps its last state.
+            now = [min(step, nodes.shape[0] - 1) for nodes in moving]
+            tensors = {}
+            for name in ("stress", "strain"):
+                values = np.array([getattr(a, name)[k] for a, k in zip(averages, now)])
+                tensors[name] = np.repeat(np.hstack([values, np.zeros((len(now), 2))]), sizes, axis=0)
+            series.add(
+                float(time),
+                np.concatenate([nodes[k] for nodes, k in zip(moving, now)]),
+                {"line": lines},
+                None,
+                {"path": np.repeat(np.arange(len(now)), sizes), **tensors},
+            )
 
 
 def _boundary_difference(a: Average) -> float:

@@ -216,21 +216,20 @@ def _write_last_good(output: Path, state: Snapshot) -> Path:
 
 def _write_vtk(output: Path, law: LinearLaw, bed: Bed) -> None:
     """Spheres as points with a radius (glyph them in ParaView), one file per phase; forces for the last."""
-    series = VtuSeries(output)
-    cells = {"vertex": np.arange(len(bed.radius))[:, None]}
-    last = list(bed.states)[-1]
-    for name, position in bed.states.items():
-        at_end = name == last
-        series.add(
-            bed.state_times[name],
-            position,
-            cells,
-            {
-                "radius": bed.radius,
-                "class": bed.kind,
-                "velocity": bed.velocity if at_end else np.zeros_like(position),
-                "coordination": bed.coordination if at_end else np.zeros_like(bed.coordination),
-                "floor_force": bed.floor_force if at_end else np.zeros_like(bed.floor_force),
-            },
-        )
-    series.close()
+    with VtuSeries(output) as series:
+        cells = {"vertex": np.arange(len(bed.radius))[:, None]}
+        last = list(bed.states)[-1]
+        for name, position in bed.states.items():
+            at_end = name == last
+            series.add(
+                bed.state_times[name],
+                position,
+                cells,
+                {
+                    "radius": bed.radius,
+                    "class": bed.kind,
+                    "velocity": bed.velocity if at_end else np.zeros_like(position),
+                    "coordination": bed.coordination if at_end else np.zeros_like(bed.coordination),
+                    "floor_force": bed.floor_force if at_end else np.zeros_like(bed.floor_force),
+                },
+            )
