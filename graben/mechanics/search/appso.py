@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graben.mechanics.search.swarm import SwarmResult, finite_values, stratified
+from graben.mechanics.search.swarm import SwarmResult, finite_values, starting
 
 Array = NDArray[np.float64]
 
@@ -116,11 +116,7 @@ def appso(
             f"appso: expected size, particles, lag, chunk >= 1, found {size}, {particles}, {lag}, {chunk}"
         )
     rng = np.random.Generator(np.random.PCG64(seed))
-    x = stratified(rng, particles, size)
-    if starts is not None and len(starts):
-        given = np.clip(np.atleast_2d(starts), 0.0, 1.0)[:particles]
-        x[: len(given)] = given
-    v = 0.5 * (stratified(rng, particles, size) - x)
+    x, v = starting(rng, particles, size, starts)
     rule = {
         "inertia": inertia, "inertia_reduction": inertia_reduction, "cognitive": cognitive, "social": social,
         "constriction": constriction,

@@ -34,6 +34,15 @@ def stratified(rng: np.random.Generator, count: int, size: int) -> Array:
     return (cells + rng.random((count, size))) / count
 
 
+def starting(rng: np.random.Generator, particles: int, size: int, starts: Array | None) -> tuple[Array, Array]:
+    """First positions and velocities: the given starts, then a stratified sample; velocities half way to another."""
+    x = stratified(rng, particles, size)
+    if starts is not None and len(starts):
+        given = np.clip(np.atleast_2d(starts), 0.0, 1.0)[:particles]
+        x[: len(given)] = given
+    return x, 0.5 * (stratified(rng, particles, size) - x)
+
+
 def swarm(
     function: Callable[[Array], Array],
     size: int,
@@ -69,11 +78,7 @@ def swarm(
     if size < 1 or particles < 1 or generations < 0:
         raise ValueError(f"swarm: expected size, particles >= 1, found {size}, {particles}")
     rng = np.random.Generator(np.random.PCG64(seed))
-    x = stratified(rng, particles, size)
-    if starts is not None and len(starts):
-        given = np.clip(np.atleast_2d(starts), 0.0, 1.0)[:particles]
-        x[: len(given)] = given
-    v = 0.5 * (stratified(rng, particles, size) - x)
+    x, v = starting(rng, particles, size, starts)
     values = finite_values(function(x), particles)
     own, own_values = x.copy(), values.copy()
     best = int(np.argmin(own_values))
