@@ -9,6 +9,11 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 RESULTS ?= results
 FIDELITY ?= standard
+# Runs that do not wait for one another go side by side.
+JOBS   ?= $(shell nproc)
+ifeq ($(MAKELEVEL),0)
+MAKEFLAGS += -j$(JOBS)
+endif
 
 include pipelines/upscaling/upscaling.mk
 include pipelines/wear/wear.mk
@@ -29,7 +34,7 @@ $(READY): pyproject.toml constraints.txt
 
 .PHONY: demo
 demo: $(READY) ## both chains at draft fidelity, one table, pictures (under 10 minutes)
-	@$(MAKE) --no-print-directory -j2 FIDELITY=draft upscaling wear
+	@$(MAKE) --no-print-directory FIDELITY=draft upscaling wear
 	@$(BIN)/python pipelines/summary.py table $(RESULTS)
 
 .PHONY: test
