@@ -70,7 +70,7 @@ class Biaxial:
         peak = int(np.argmin(vertical))
         middle = arrays["vertex_position"][arrays["zone_vertex"]].mean(axis=1)
         inside = np.hypot(*(middle - size / 2.0).T) < 0.4 * size.min()
-        area = self.model.skeleton.area
+        area = self.model.zone_area
         lateral = mean_stress(arrays["zone_stress"], area, inside if inside.any() else area > 0.0)[:, 0]
         after = slice(1, peak + 1) if peak > 0 else slice(None)
         return {

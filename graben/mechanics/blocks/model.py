@@ -90,8 +90,9 @@ class BlockModel:
         self.skin: Skin = chamfered_skin(bodies, rounding)
         self.parts = cut_into_parts(bodies, self.skin)
         nv, nn = len(bodies.position), len(self.skin.first)
-        gradient, area = zones.shape_gradients(bodies.position, bodies.zone_vertex)
+        gradient, self.zone_area = zones.shape_gradients(bodies.position, bodies.zone_vertex)
         lam, mu = zones.lame(young, poisson)
+        area = self.zone_area
         lam_z, mu_z = np.full(len(area), lam), np.full(len(area), mu)
         self.true_mass = np.bincount(
             bodies.zone_vertex.ravel(), weights=np.repeat(density * area / 3.0, 3), minlength=nv
@@ -117,11 +118,7 @@ class BlockModel:
         self.weight = self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :]
         self.mass_ratio = mass / self.true_mass
         self.skeleton = rx.Skeleton(
-            bodies.zone_vertex.astype(np.int32),
-            gradient,
-            area,
-            lam_z,
-            mu_z,
+            zones.ElasticZones(bodies.zone_vertex.astype(np.int32), gradient, area, lam_z, mu_z),
             self.skin.first.astype(np.int32),
             self.skin.second.astype(np.int32),
             self.skin.weight,
@@ -147,7 +144,7 @@ class BlockModel:
             aligned(nn, COLUMNS),
             aligned(nn, 2),
             np.zeros(6),
-            np.zeros(2),
+            np.zeros(3),
             np.zeros(5),
             **search.fresh_watch(search.no_pairs(), self.parts, np.zeros((nn, COLUMNS))),
         )
@@ -322,8 +319,7 @@ class BlockModel:
 
     def zone_stress(self) -> np.ndarray:
         """Cauchy stress (zones, 4) as xx, yy, zz, xy [Pa]."""
-        s = self.skeleton
-        return zones.zone_state(self.motion.x, s.triangles, s.gradient, s.area, s.lam, s.mu)[0]
+        return zones.zone_state(self.motion.x, *self.skeleton.zones)[0]
 
     def contacts(self) -> tuple[np.ndarray, np.ndarray, float]:
         """Touching pairs: out (n, 11) and ints (n, 2) as in `joints.contact_state`, and the stored energy [J/m]."""
@@ -363,8 +359,8 @@ class BlockModel:
 
     def energies(self) -> dict[str, float]:
         """Energy ledger [J per m of thickness]; error = work put in - everything accounted for."""
-        s, m, t = self.skeleton, self.motion, self.motion.tally
-        _, strain = zones.zone_state(m.x, s.triangles, s.gradient, s.area, s.lam, s.mu)
+        m, t = self.motion, self.motion.tally
+        _, strain = zones.zone_state(m.x, *self.skeleton.zones)
         e = {
             "kinetic": float(t[rx.KINETIC]),
             "strain": strain,

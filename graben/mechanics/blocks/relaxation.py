@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 
 from graben.mechanics.blocks.joints import contact_forces, node_motion, scatter_nodes
+from graben.mechanics.blocks.moving import (
+    AT_DAMPED,
+    AT_DEEP,
+    AT_FRICTION,
+    AT_KINETIC,
+    AT_LOAD,
+    AT_OVERLAP,
+    AT_PLASTIC,
+    AT_WALL,
+    COLUMNS,
+    move_blocks,
+)
 from graben.mechanics.blocks.search import follow_blocks, look_again
-from graben.mechanics.blocks.zones import zone_forces
 from graben.mechanics.compiled import kernel
 
 DONE, REBUILD, RUNAWAY, DEEP_OVERLAP = 0, 1, 2, 3
@@ -17,29 +28,21 @@ DONE, REBUILD, RUNAWAY, DEEP_OVERLAP = 0, 1, 2, 3
 # Places in Motion.tally
 KINETIC, DAMPED, LOAD_WORK, WALL_WORK, RATE_SEEN, DAMPED_SEEN = range(6)
 # Places in Motion.sums
-FRICTION, LARGEST_OVERLAP = range(2)
+FRICTION, LARGEST_OVERLAP, PLASTIC = range(3)
 # Places in Motion.drive
 DAMPING, LOAD, LOAD_STEP, SPEED, SPEED_STEP = range(5)
-
-# Columns of what each part adds up (one cache line a part): friction work, largest overlap, kinetic energy, powers
-# of damping, loads and walls; and the pair that overlaps too far.
-_FRICTION, _OVERLAP, _KINETIC, _DAMPED, _LOAD, _WALL, _DEEP, _SUMS = 0, 1, 2, 3, 4, 5, 6, 8
 
 
 class Skeleton(NamedTuple):
     """What does not change while stepping: zones, contact nodes, masses, constraints and loads.
 
-    triangles, gradient, area, lam, mu : zones; first, second, weight, follow : contact nodes
+    zones : ElasticZones, or another law of moving.py; first, second, weight, follow : contact nodes
     mass : (vertices,) [kg/m]; still : (k, 2) vertex and axis of prescribed velocities, wall : (vertices, 2) [m/s];
     still_start : (parts + 1,) where those of each part begin
     steady, rising : (vertices, 2) forces [N/m]; the load is steady + drive[LOAD] * rising
     """
 
-    triangles: np.ndarray
-    gradient: np.ndarray
-    area: np.ndarray
-    lam: np.ndarray
-    mu: np.ndarray
+    zones: Any
     first: np.ndarray
     second: np.ndarray
     weight: np.ndarray
@@ -96,76 +99,6 @@ class Motion(NamedTuple):
 
 
 @kernel(error_model="numpy")
-def _move(p, s, m, parts, load, alpha, local, dt, speed, sums):
-    """New velocities and positions in part p; adds up kinetic energy, and the powers of damping, loads and walls.
-
-    Vertices of prescribed velocity move freely in the first loop, which knows no exceptions, and are put right after.
-    """
-    x, v, mass, zone, joint, reaction = m.x, m.v, s.mass, m.zone_force, m.joint_force, m.reaction
-    steady, rising, still, wall = s.steady, s.rising, s.still, s.wall
-    slow = 1.0 - 0.5 * alpha * dt
-    fast = 1.0 / (1.0 + 0.5 * alpha * dt)
-    kinetic = 0.0
-    damped = 0.0
-    load_work = 0.0
-    wall_work = 0.0
-    for k in range(s.still_start[p], s.still_start[p + 1]):
-        i = still[k, 0]
-        d = still[k, 1]
-        # For now the old velocity is kept here.
-        reaction[i, d] = v[i, d]
-    for i in range(parts.vertex[p], parts.vertex[p + 1]):
-        push = dt / mass[i]
-        half = 0.5 * mass[i]
-        for d in range(2):
-            old = v[i, d]
-            applied = steady[i, d] + load * rising[i, d]
-            total = zone[i, d] + joint[i, d] + applied
-            if local > 0.0:
-                drag = local * abs(total)
-                if old < 0.0:
-                    drag = -drag
-                elif old == 0.0:
-                    drag = 0.0
-                new = (old * slow + (total - drag) * push) * fast
-                damped += 0.5 * drag * (old + new)
-            else:
-                new = (old * slow + total * push) * fast
-            mean = 0.5 * (old + new)
-            damped += 2.0 * alpha * half * mean * mean
-            load_work += applied * mean
-            kinetic += half * new * new
-            v[i, d] = new
-            x[i, d] += dt * new
-    for k in range(s.still_start[p], s.still_start[p + 1]):
-        i = still[k, 0]
-        d = still[k, 1]
-        old = reaction[i, d]
-        free = v[i, d]
-        mean = 0.5 * (old + free)
-        applied = steady[i, d] + load * rising[i, d]
-        total = zone[i, d] + joint[i, d] + applied
-        drag = 0.0
-        if local > 0.0 and old != 0.0:
-            drag = local * abs(total) if old > 0.0 else -local * abs(total)
-        damped -= (alpha * mass[i] * mean + drag) * mean
-        load_work -= applied * mean
-        new = wall[i, d] * speed
-        mean = 0.5 * (old + new)
-        # A wall also carries the inertia of what it moves.
-        reaction[i, d] = mass[i] * (new - old) / dt - total
-        wall_work += reaction[i, d] * mean
-        load_work += applied * mean
-        kinetic += 0.5 * mass[i] * (new * new - free * free)
-        v[i, d] = new
-        x[i, d] += dt * (new - free)
-    sums[p, _KINETIC] = kinetic
-    sums[p, _DAMPED] = damped
-    sums[p, _LOAD] = load_work
-    sums[p, _WALL] = wall_work
-
-
-@kernel(error_model="numpy")
 def _press(p, s, m, parts, pairs, joints, deepest, dt, sums):
     """Contact forces of the pairs of part p."""
     fn, far = m.fn, m.far
@@ -176,9 +109,9 @@ def _press(p, s, m, parts, pairs, joints, deepest, dt, sums):
         for d in range(4):
             far[r, d] = 0.0
     own = sums[p]
-    own[_FRICTION] = 0.0
-    own[_OVERLAP] = 0.0
-    own[_DEEP] = -1.0
+    own[AT_FRICTION] = 0.0
+    own[AT_OVERLAP] = 0.0
+    own[AT_DEEP] = -1.0
     for k in range(m.turn.shape[1] - 1):
         bad = contact_forces(
             m.active,
@@ -198,7 +131,7 @@ def _press(p, s, m, parts, pairs, joints, deepest, dt, sums):
             own,
         )
         if bad >= 0:
-            own[_DEEP] = bad
+            own[AT_DEEP] = bad
 
 
 @kernel(error_model="numpy")
@@ -213,16 +146,14 @@ def _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums):
         fn[i, 1] += far[r, 1]
         fn[j, 0] += far[r, 2]
         fn[j, 1] += far[r, 3]
-    joint_force, zone_force = m.joint_force, m.zone_force
+    joint_force = m.joint_force
     for i in range(parts.vertex[p], parts.vertex[p + 1]):
         for d in range(2):
             joint_force[i, d] = 0.0
-            zone_force[i, d] = 0.0
     begin = parts.node[p]
     end = parts.node[p + 1]
     scatter_nodes(fn, s.first, s.second, s.weight, joint_force, begin, end)
-    zone_forces(m.x, s.triangles, s.gradient, s.area, s.lam, s.mu, zone_force, parts.zone[p], parts.zone[p + 1])
-    _move(p, s, m, parts, load, alpha, local, dt, speed, sums)
+    move_blocks(s.zones, p, s, m, parts, load, alpha, local, dt, speed, sums)
     node_motion(m.x, m.v, s.first, s.second, s.weight, follow, m.node, begin, end)
 
 
@@ -248,12 +179,13 @@ def _gather(m, sums, damping_ratio, damping_limit, alpha, dt):
     wall_work = 0.0
     largest = 0.0
     for p in range(sums.shape[0]):
-        m.sums[FRICTION] += sums[p, _FRICTION]
-        largest = max(largest, sums[p, _OVERLAP])
-        kinetic += sums[p, _KINETIC]
-        damped += sums[p, _DAMPED]
-        load_work += sums[p, _LOAD]
-        wall_work += sums[p, _WALL]
+        m.sums[FRICTION] += sums[p, AT_FRICTION]
+        m.sums[PLASTIC] += sums[p, AT_PLASTIC]
+        largest = max(largest, sums[p, AT_OVERLAP])
+        kinetic += sums[p, AT_KINETIC]
+        damped += sums[p, AT_DAMPED]
+        load_work += sums[p, AT_LOAD]
+        wall_work += sums[p, AT_WALL]
     m.sums[LARGEST_OVERLAP] = largest
     t = m.tally
     if damping_ratio >= 0.0:
@@ -285,8 +217,8 @@ def _worst(column):
 def _deep(sums):
     """The first pair of all parts that overlaps too far, or -1."""
     for p in range(sums.shape[0]):
-        if sums[p, _DEEP] >= 0.0:
-            return int(sums[p, _DEEP])
+        if sums[p, AT_DEEP] >= 0.0:
+            return int(sums[p, AT_DEEP])
     return -1
 
 
@@ -321,7 +253,7 @@ def advance(
     fastest : kinetic energy that stops the run [J/m]
     """
     count = parts.node.shape[0] - 1
-    sums = np.zeros((count, _SUMS))
+    sums = np.zeros((count, COLUMNS))
     _begin(s, m)
     for step in range(steps):
         if m.due[0] <= 0:
@@ -340,7 +272,7 @@ def advance(
             _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums)
         bad = _deep(sums)
         if bad >= 0:
-            m.sums[LARGEST_OVERLAP] = sums[:, _OVERLAP].max()
+            m.sums[LARGEST_OVERLAP] = sums[:, AT_OVERLAP].max()
             return DEEP_OVERLAP, step, bad
         if not _gather(m, sums, damping_ratio, damping_limit, alpha, dt) < fastest:
             return RUNAWAY, step, -1
@@ -395,7 +327,7 @@ def advance_together(
 ):
     """`advance` with parts shared out to threads: the same result, bit for bit."""
     count = parts.node.shape[0] - 1
-    sums = np.zeros((count, _SUMS))
+    sums = np.zeros((count, COLUMNS))
     shares = min(count, threads)
     share, before = _share_out(m, count, shares)
     _begin(s, m)
@@ -433,7 +365,7 @@ def advance_together(
             )
         bad = _deep(sums)
         if bad >= 0:
-            m.sums[LARGEST_OVERLAP] = sums[:, _OVERLAP].max()
+            m.sums[LARGEST_OVERLAP] = sums[:, AT_OVERLAP].max()
             return DEEP_OVERLAP, step, bad
         if not _gather(m, sums, damping_ratio, damping_limit, alpha, dt) < fastest:
             return RUNAWAY, step, -1

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 import numpy as np
 
 from graben.mechanics.blocks.model import BlockModel
 
-_GROUPS = ("motion", "pairs", "skeleton")
+_GROUPS = ("motion", "pairs", "skeleton", "skeleton.zones")
 _COUNTERS = ("steps_done", "rebuilds")
 
 
@@ -14,7 +16,7 @@ def take(model: BlockModel) -> dict[str, np.ndarray]:
     """Copies of everything that stepping changes, and of constraints and loads, by name."""
     result: dict[str, np.ndarray] = {}
     for group in _GROUPS:
-        for name, value in getattr(model, group)._asdict().items():
+        for name, value in attrgetter(group)(model)._asdict().items():
             if isinstance(value, np.ndarray):
                 result[f"{group}.{name}"] = value.copy()
     result["held"] = model.held.copy()
@@ -29,7 +31,7 @@ def bring_back(model: BlockModel, state: dict[str, np.ndarray]) -> None:
     if len(model.motion.x) != len(state.get("motion.x", ())) or model.held.shape != state["held"].shape:
         raise ValueError("state of another model: number of vertices")
     for group in _GROUPS:
-        own = getattr(model, group)
+        own = attrgetter(group)(model)
         found = {}
         for name, value in own._asdict().items():
             if not isinstance(value, np.ndarray):
@@ -39,7 +41,10 @@ def bring_back(model: BlockModel, state: dict[str, np.ndarray]) -> None:
             if stored is None or stored.dtype != value.dtype or stored.ndim != value.ndim:
                 raise ValueError(f"state of another model: {group}.{name}")
             found[name] = np.ascontiguousarray(stored)
-        setattr(model, group, own._replace(**found))
+        if group == "skeleton.zones":
+            model.skeleton = model.skeleton._replace(zones=own._replace(**found))
+        else:
+            setattr(model, group, own._replace(**found))
     model.held[:] = state["held"]
     model.time = float(state["time"])
     for name in _COUNTERS:

@@ -6,10 +6,22 @@ under rotation of any size. Nodal forces are -A F S grad N, the Cauchy stress is
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from graben.mechanics.blocks.memory import ask_for
 from graben.mechanics.compiled import kernel
+
+
+class ElasticZones(NamedTuple):
+    """Elastic zones: triangles (zones, 3), gradient and area as of `shape_gradients`, lam and mu (zones,) [Pa]."""
+
+    triangles: np.ndarray
+    gradient: np.ndarray
+    area: np.ndarray
+    lam: np.ndarray
+    mu: np.ndarray
 
 
 def shape_gradients(position: np.ndarray, triangles: np.ndarray):

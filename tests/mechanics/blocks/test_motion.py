@@ -112,7 +112,7 @@ def small_run():
 def test_consolidation_reaches_the_applied_stress(small_run):
     model, ratio, (stress, force), _ = small_run
     assert ratio < 1e-3
-    mean = mean_stress(stress, model.skeleton.area, np.ones(len(stress), bool))
+    mean = mean_stress(stress, model.zone_area, np.ones(len(stress), bool))
     assert mean[0] == pytest.approx(-0.5e6, rel=0.02)
     assert mean[1] == pytest.approx(-0.25e6, rel=0.02)
     bottom = model.bodies.vertex_side[:, 0]
@@ -131,7 +131,7 @@ def test_compression_balances_and_gains_strength(small_run):
     # Averaged stress equals what the boundary forces say: sum of x (x) f over the area.
     x = a["vertex_position"] + a["displacement"][3]
     by_force = np.einsum("vi,vj->ij", x, a["boundary_force"][3])
-    zones = np.einsum("z,zc->c", model.skeleton.area, a["zone_stress"][3])
+    zones = np.einsum("z,zc->c", model.zone_area, a["zone_stress"][3])
     assert by_force[1, 1] == pytest.approx(zones[1], rel=0.03)
 
 
