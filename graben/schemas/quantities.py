@@ -64,6 +64,7 @@ _EXAMPLES = {
     "m/s": "5 mm/s",
     "Pa/s": "0.25 MPa/s",
     "rad/s": "200 rpm",
+    "1/s": "10 1/s",
 }
 
 Length = _quantity("m")
@@ -77,6 +78,7 @@ Speed = _quantity("m/s")
 AngularSpeed = _quantity("rad/s")
 Acceleration = _quantity("m/s^2")
 Time = _quantity("s")
+Frequency = _quantity("1/s")
 Force = _quantity("N")
 PressureRate = _quantity("Pa/s")
 

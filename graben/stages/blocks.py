@@ -158,9 +158,22 @@ def _model(scene: BlocksScene, tessellation: Tessellation, dt: float, gravity: t
         rounding=scene.tessellation.rounding,
         dt=dt,
         gravity=gravity,
-        damping=Damping(ratio=scene.numerics.damping_ratio),
+        damping=_damping(scene, dt),
         threads=scene.numerics.threads,
     )
+
+
+def _damping(scene: BlocksScene, dt: float) -> Damping:
+    n = scene.numerics
+    if n.damping == "local":
+        return Damping(ratio=-1.0, local=n.damping_share or 0.0)
+    if n.damping == "viscous":
+        coefficient = n.damping_coefficient or 0.0
+        if coefficient * dt > 1.0:
+            key, value = "numerics.damping_coefficient", f"{coefficient:.4g} 1/s"
+            raise BadInput(Fault(str(scene.source.path), key, value, f"at most 1 / time step = {1.0 / dt:.4g} 1/s"))
+        return Damping(ratio=-1.0, coefficient=coefficient)
+    return Damping(ratio=n.damping_ratio)
 
 
 def _check_ledger(history: History, limit: float, step: int) -> None:

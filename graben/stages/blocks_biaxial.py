@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from graben.mechanics.blocks.compression import compress, consolidate, rectangle_sides
+from graben.mechanics.blocks.compression import Courses, compress, consolidate, rectangle_sides
+from graben.mechanics.blocks.courses import Course
 from graben.mechanics.blocks.history import History, mean_stress
 from graben.mechanics.blocks.model import BlockModel
 from graben.schemas.scenes.blocks import BlocksScene
+from graben.schemas.scenes.blocks_loading import Loading
 from graben.stages.record import Progress
 
 
@@ -27,6 +29,7 @@ class Biaxial:
     def __init__(self, scene: BlocksScene, model: BlockModel, steps: int) -> None:
         self.scene, self.model, self.steps = scene, model, steps
         self.rest = np.zeros(2)  # unbalanced force ratio of consolidation, its steps
+        self.courses = _courses(scene.loading, scene.loading.duration / steps)
 
     def begin(self, progress: Progress) -> None:
         """Consolidate."""
@@ -48,7 +51,8 @@ class Biaxial:
             save()
             progress(k / (states - 1), f"state {k} of {states - 1}")
 
-        compress(self.model, -self.scene.loading.speed, self.steps, states, saved, saved=len(history.time))
+        speed, behind = -self.scene.loading.speed, len(history.time)
+        compress(self.model, speed, self.steps, states, saved, saved=behind, courses=self.courses)
 
     def state(self) -> dict[str, np.ndarray]:
         """What a checkpoint must hold beside the model."""
@@ -59,7 +63,19 @@ class Biaxial:
 
     def arrays(self, history: History) -> dict[str, np.ndarray]:
         """Arrays of the artifact that only this test has."""
-        return {"confining_stress": np.array(-self.scene.loading.confining_pressure)}
+        loading = self.scene.loading
+        arrays = {"confining_stress": np.array(-loading.confining_pressure)}
+        if loading.confining_course is not None:
+            course = Course(loading.confining_course)
+            arrays["confining_stress_then"] = np.array([-course.at(t) for t in history.time])
+        return arrays
+
+    def _strain(self, time: float, height: float) -> float:
+        """Nominal strain, compression negative."""
+        loading = self.scene.loading
+        if loading.speed_course is None:
+            return float(-loading.speed * time / height)
+        return float(-Course(loading.speed_course).integral(time) / height)
 
     def headline(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         """Peak of the top wall's mean stress (Pa, compression negative), nominal strain there, error measures."""
@@ -73,17 +89,30 @@ class Biaxial:
         area = self.model.zone_area
         lateral = mean_stress(arrays["zone_stress"], area, inside if inside.any() else area > 0.0)[:, 0]
         after = slice(1, peak + 1) if peak > 0 else slice(None)
+        applied = arrays.get("confining_stress_then", np.full(len(lateral), arrays["confining_stress"]))
         return {
             "blocks": len(arrays["block_area"]),
             "confining_stress_pa": float(arrays["confining_stress"]),
             "peak_wall_stress_pa": float(vertical[peak]),
-            "strain_at_peak": float(-self.scene.loading.speed * arrays["time"][peak] / size[1]),
+            "strain_at_peak": self._strain(float(arrays["time"][peak]), size[1]),
             "steps": self.model.steps_done,
             "energy_error": energy_error(arrays),
             "kinetic_over_stored_energy": float(kinetic_share(arrays)[after].mean()),
-            "lateral_over_applied_stress": float(lateral[after].mean() / arrays["confining_stress"]),
+            "lateral_over_applied_stress": float((lateral / applied)[after].mean()),
             "bottom_over_top_reaction": float((push[after, sides.bottom, 1] / -push[after, sides.top, 1]).mean()),
         }
+
+
+def _courses(loading: Loading, dt: float) -> Courses | None:
+    """Courses over steps of dt; None where speed and pressure are steady."""
+    if loading.speed_course is None and loading.confining_course is None:
+        return None
+    down = loading.speed_course or [(0.0, 0.0), (0.01 * loading.duration, loading.speed)]
+    pressure = loading.confining_course
+    return Courses(
+        Course([(time, -speed) for time, speed in down]).in_steps(dt),
+        None if pressure is None else Course(pressure).in_steps(dt),
+    )
 
 
 def energy_error(arrays: dict[str, np.ndarray]) -> float:

@@ -10,9 +10,12 @@ import numpy as np
 
 from graben.mechanics.blocks import programme as mechanics
 from graben.mechanics.blocks import relaxation as rx
+from graben.mechanics.blocks.courses import Course
 from graben.mechanics.blocks.history import History
+from graben.mechanics.blocks.loads import Loads
 from graben.mechanics.blocks.model import BlockModel
-from graben.schemas.scenes.blocks import BlocksScene, Programme
+from graben.schemas.scenes.blocks import BlocksScene
+from graben.schemas.scenes.blocks_loading import Load, Programme
 from graben.stages.blocks_biaxial import energy_error, kinetic_share
 from graben.stages.record import Progress
 
@@ -41,14 +44,14 @@ class Rising:
             for axis, name in enumerate("xy"):
                 if support.fix in (name, "both"):
                     model.hold(at, axis)
-        self._rising = np.zeros_like(b.position)
+        self.loads = Loads(len(b.position))
         for load in self.programme.loads:
             try:
                 unit = mechanics.pressure_forces(b, np.array(load.start), np.array(load.end))
             except ValueError as error:
                 raise ValueError(f"load {load.name!r}: {error}") from error
-            model.skeleton.steady[:] += load.pressure * unit
-            self._rising += load.rate * unit
+            self.loads.add(unit, _course(load))
+        self.loads.begin(model, 0.0)
 
     def begin(self, progress: Progress) -> None:
         """Bring the body to rest under its weight and steady pressures."""
@@ -64,16 +67,15 @@ class Rising:
         """Raise the pressures from the last saved state to failure or to the end."""
         m, p, rise = self.model, self.programme, self.rise
         if not history.time:
-            m.skeleton.rising[:] = self._rising
             m.motion.tally[:] = 0.0
             m.motion.sums[rx.FRICTION] = 0.0
             self._save(save)
-        if not self._rising.any():
+        if not self.loads.direction.any():
             return
         while rise.load_time < p.end * (1.0 - 1e-9) and not rise.failed:
             if rise.waited == 0:
                 self.carried = m.motion.x.copy()
-            mechanics.look_at(m, rise, self.control, p.end, history.reference)
+            mechanics.look_at(m, rise, self.control, self.loads, p.end, history.reference)
             self.looks.append((rise.load_time, rise.settlement, rise.imbalance))
             if rise.failed or rise.load_time >= self.next_save:
                 self._save(save)
@@ -137,9 +139,12 @@ class Rising:
         return vertex[np.lexsort((vertex, where))].astype(np.int32)
 
     def _inertia(self, arrays: dict[str, np.ndarray]) -> float:
-        """What supports and weight leave of the rising load: root mean square of the shares, first and last states
-        aside."""
-        load = arrays["load_time"][1:-1, None] * self._rising.sum(axis=0)
+        """What supports and weight leave of the change of load: root mean square of the shares, first and last
+        states aside."""
+        times = arrays["load_time"][1:-1]
+        load = np.zeros((len(times), 2))
+        for force, course in self.loads.patterns:
+            load += np.outer([course.at(t) - course.at(0.0) for t in times], force.sum(axis=0))
         if not load.any():
             return 0.0
         total = arrays["boundary_force"][1:-1].sum(axis=1) + self.model.weight.sum(axis=0)
@@ -148,14 +153,16 @@ class Rising:
     def headline(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         """Failure load (Pa; null where the end came first), settlement of the loaded ground, error measures."""
         reference = arrays["vertex_position"]
-        rising = [load for load in self.programme.loads if load.rate > 0.0]
-        largest = rising[0].pressure + rising[0].rate * self.rise.load_time if rising else 0.0
-        loaded = self._rising.any(axis=1)
+        course = next((c for c in map(_course, self.programme.loads) if c.changes), Course([(0.0, 0.0)]))
+        last, end = course.at(self.rise.load_time), self.rise.load_time
+        largest = max(last, course.at(0.0), *(v for t, v in zip(course.times, course.values) if t <= end))
+        direction = self.loads.direction
+        loaded = direction.any(axis=1)
         sunk = -(self.carried - reference)[loaded, 1] if loaded.any() else np.zeros(1)
-        mean = (self._rising * (self.carried - reference)).sum() / max(np.hypot(*self._rising.T).sum(), 1e-300)
+        mean = (direction * (self.carried - reference)).sum() / max(np.hypot(*direction.T).sum(), 1e-300)
         return {
             "blocks": len(arrays["block_area"]),
-            "failure_load_pa": float(largest) if self.rise.failed else None,
+            "failure_load_pa": float(last) if self.rise.failed else None,
             "failed": self.rise.failed,
             "largest_load_pa": float(largest),
             "settlement_m": float(mean),
@@ -169,3 +176,8 @@ class Rising:
             "energy_error": energy_error(arrays),
             "kinetic_over_stored_energy": float(kinetic_share(arrays)[1:-1].mean()) if len(self.looks) else 0.0,
         }
+
+
+def _course(load: Load) -> Course:
+    """Pressure over the time of loading [Pa]."""
+    return Course(load.course) if load.course is not None else Course([(0.0, load.pressure)], load.rate)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from graben.mechanics.blocks import relaxation as rx
+from graben.mechanics.blocks.courses import Course
 from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.failure import NumericsFailed
 
@@ -45,21 +46,23 @@ def consolidate(
     """Press left and right with `lateral`, the top with `vertical` [Pa, tension positive]; bottom on rollers.
 
     Steps until the unbalanced force falls below `tolerance`; returns the ratio reached. Raises NumericsFailed when
-    it does not within `limit` steps.
+    it does not within `limit` steps. The rising load becomes a pressure of 1 Pa on left and right, for courses.
     """
     b = model.bodies
     sides = rectangle_sides(b.outline)
     model.hold(b.vertex_side[:, sides.bottom], 1)
     for side in (sides.left, sides.right):
         model.press(b.edge_side == side, lateral)
+        model.press(b.edge_side == side, -1.0, rising=True)
     model.press(b.edge_side == sides.top, vertical)
     ratio = np.inf
-    damping, model.damping = model.damping, Damping(ratio=_CONSOLIDATION_DAMPING)
+    damping = model.damping
+    model.damp(Damping(ratio=_CONSOLIDATION_DAMPING))
     for _ in range(0, limit, chunk):
         model.advance(chunk)
         ratio = model.unbalanced_ratio()
         if ratio < tolerance:
-            model.damping = damping
+            model.damp(damping)
             return ratio
     raise NumericsFailed(
         f"unbalanced force ratio {ratio:.3g} (limit {tolerance:.3g})",
@@ -67,6 +70,35 @@ def consolidate(
         step=model.steps_done,
         advice="strengthen the joints or lower the confining stress",
     )
+
+
+@dataclass(frozen=True)
+class Courses:
+    """What the walls do over steps of loading, where it is more than a steady speed.
+
+    speed : of the top [m/s, positive: up]; pressure : on left and right [Pa], or None: as consolidated
+    """
+
+    speed: Course
+    pressure: Course | None = None
+
+    @property
+    def fastest(self) -> float:
+        """Largest speed in either direction [m/s]."""
+        return float(np.abs(self.speed.values).max())
+
+    def drive(self, model: BlockModel, done: int) -> int:
+        """Set wall speed and pressure for what follows step `done`; returns the step of the next point."""
+        d, speed = model.motion.drive, self.speed
+        # The speed in the middle of a step moves the wall by just what the course says.
+        slope = speed.slope(done) / self.fastest
+        d[rx.SPEED], d[rx.SPEED_STEP] = speed.at(done) / self.fastest + 0.5 * slope, slope
+        stop = speed.next_point(done)
+        if self.pressure is not None:
+            d[rx.LOAD] = self.pressure.at(done) - self.pressure.values[0]
+            d[rx.LOAD_STEP] = self.pressure.slope(done)
+            stop = min(stop, self.pressure.next_point(done))
+        return int(min(stop, 2**62))
 
 
 def compress(
@@ -78,11 +110,13 @@ def compress(
     *,
     ramp_share: float = 0.01,
     saved: int = 0,
+    courses: Courses | None = None,
 ) -> None:
     """Move the top at `speed` [m/s, negative: down] for `steps` steps; call save(k, model) at `states` states.
 
     State 0 is the start. The speed rises over the first `ramp_share` of the steps. The pressure on the top is
     dropped: the wall now carries it. saved : states that a model brought back from a snapshot has behind it.
+    courses : instead of speed and ramp
     """
     b = model.bodies
     top = b.vertex_side[:, rectangle_sides(b.outline).top]
@@ -93,9 +127,13 @@ def compress(
         saved = 1
     if saved == 1:
         model.skeleton.steady[top, 1] = model.weight[top, 1]
-        model.hold(top, 1, speed)
+        model.hold(top, 1, speed if courses is None else courses.fastest)
         d = model.motion.drive
         d[rx.SPEED], d[rx.SPEED_STEP] = 0.0, 1.0 / max(1.0, ramp_share * steps)
     for k in range(saved, states):
-        model.advance(round(steps * k / (states - 1)) - round(steps * (k - 1) / (states - 1)))
+        done, end = (round(steps * j / (states - 1)) for j in (k - 1, k))
+        while done < end:
+            stop = end if courses is None else min(end, courses.drive(model, done))
+            model.advance(stop - done)
+            done = stop
         save(k, model)

@@ -161,8 +161,17 @@ class BlockModel:
         self.most_energy = 10.0 * float(np.median(mass)) * self.fastest**2
         self._low = bodies.position.min(axis=0) - size
         self._span = np.ptp(bodies.position, axis=0) + 2.0 * size
-        self.motion.drive[rx.DAMPING] = self.damping.coefficient if self.damping.ratio < 0 else 0.01 / self.dt
+        self.motion.drive[rx.DAMPING] = self._first_coefficient(self.damping)
         self.rebuild(first=intact)
+
+    def _first_coefficient(self, damping: Damping) -> float:
+        return damping.coefficient if damping.ratio < 0 else 0.01 / self.dt
+
+    def damp(self, damping: Damping) -> None:
+        """Change the damping. Its coefficient goes on from where it is if it is adaptive before and after."""
+        if damping.ratio < 0 or self.damping.ratio < 0:
+            self.motion.drive[rx.DAMPING] = self._first_coefficient(damping)
+        self.damping = damping
 
     def _vertex_stiffness(self, gradient, area, lam, mu) -> np.ndarray:
         """Bound on the stiffness that a vertex sees, from zones and from the joints along its edges [N/m per m]."""

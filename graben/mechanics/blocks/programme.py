@@ -13,6 +13,7 @@ import numpy as np
 
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.bodies import Bodies
+from graben.mechanics.blocks.loads import Loads
 from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.failure import NumericsFailed
 
@@ -92,13 +93,14 @@ def come_to_rest(
     Raises NumericsFailed when it does not within `limit` steps: the body does not stand.
     """
     ratio = np.inf
-    damping, model.damping = model.damping, Damping(ratio=_SETTLING_DAMPING)
+    damping = model.damping
+    model.damp(Damping(ratio=_SETTLING_DAMPING))
     for _ in range(0, limit, chunk):
         model.advance(chunk)
         ratio = imbalance(model)
         tell(ratio, model.steps_done)
         if ratio < tolerance:
-            model.damping = damping
+            model.damp(damping)
             return ratio
     raise NumericsFailed(
         f"unbalanced force ratio {ratio:.3g} (limit {tolerance:.3g})",
@@ -128,12 +130,14 @@ class Control:
 class Rise:
     """Where a rising load stands.
 
-    load_time : s of rise so far, waiting not counted; settlement : m, displacement along the loads, weighted by them
+    load_time : s of rise so far, waiting not counted; since : load time at which rates of loads last changed
+    settlement : m, displacement along the loads, weighted by them
     speed, first_speed : of the settlement, now and in the first per cent of the rise [m/s]
     waited, waited_in_all : steps; failed : whether the last wait was in vain
     """
 
     load_time: float = 0.0
+    since: float = 0.0
     settlement: float = 0.0
     speed: float = 0.0
     first_speed: float = 0.0
@@ -143,19 +147,35 @@ class Rise:
     failed: bool = False
 
 
-def look_at(model: BlockModel, rise: Rise, control: Control, end: float, reference: np.ndarray) -> None:
+def look_at(
+    model: BlockModel,
+    rise: Rise,
+    control: Control,
+    loads: Loads,
+    end: float,
+    reference: np.ndarray,
+    stop: float = np.inf,
+) -> None:
     """One chunk of steps; the loads rise in it if the blocks kept up in the last one. Brings `rise` up to date.
 
-    reference : vertex positions that settlement counts from; end : load time at which the rise is complete [s]
+    end : load time at which the rise is complete [s]; reference : vertex positions that settlement counts from
+    stop : load time that the chunk must not run past; it does not run past points of courses either
     """
-    s, drive = model.skeleton, model.motion.drive
-    calm = rise.imbalance < control.calm
-    drive[rx.LOAD_STEP] = model.dt if calm else 0.0
-    model.advance(control.chunk)
-    drive[rx.LOAD_STEP] = 0.0
-    rise.load_time = float(drive[rx.LOAD])
-    settlement = float((s.rising * (model.motion.x - reference)).sum() / np.hypot(*s.rising.T).sum())
-    rise.speed = (settlement - rise.settlement) / (control.chunk * model.dt)
+    m = model.motion
+    calm, chunk = rise.imbalance < control.calm, control.chunk
+    point = loads.next_point(rise.since)
+    if calm:
+        left = (min(stop, point) - rise.load_time) / model.dt
+        chunk = int(min(chunk, max(1.0, np.rint(left))))
+    m.drive[rx.LOAD_STEP] = model.dt if calm else 0.0
+    model.advance(chunk)
+    m.drive[rx.LOAD_STEP] = 0.0
+    rise.load_time = rise.since + float(m.drive[rx.LOAD])
+    if rise.load_time > point - 0.5 * model.dt:
+        rise.since = rise.load_time = point
+        loads.begin(model, point)
+    settlement = _settlement(loads.direction, m.x - reference)
+    rise.speed = (settlement - rise.settlement) / (chunk * model.dt)
     rise.settlement = settlement
     rise.imbalance = imbalance(model)
     if calm:
@@ -163,9 +183,14 @@ def look_at(model: BlockModel, rise: Rise, control: Control, end: float, referen
         if rise.load_time <= 0.01 * end or rise.first_speed == 0.0:
             rise.first_speed = settlement / rise.load_time
         return
-    rise.waited += control.chunk
-    rise.waited_in_all += control.chunk
+    rise.waited += chunk
+    rise.waited_in_all += chunk
     sinking = rise.speed > rise.first_speed
-    rise.failed = rise.speed > _COLLAPSE * rise.first_speed or rise.waited >= (
-        control.patience if sinking else 4 * control.patience
-    )
+    collapsing = rise.first_speed > 0.0 and rise.speed > _COLLAPSE * rise.first_speed
+    rise.failed = collapsing or rise.waited >= (control.patience if sinking else 4 * control.patience)
+
+
+def _settlement(direction: np.ndarray, moved: np.ndarray) -> float:
+    """Displacement along the loads [m]; where no load changes, the mean distance that vertices went."""
+    whole = float(np.hypot(*direction.T).sum())
+    return float((direction * moved).sum() / whole) if whole > 0.0 else float(np.hypot(*moved.T).mean())

@@ -52,6 +52,9 @@ LAYOUT = Layout(
         ),
         "wall_reaction": Variable(("time", "wall", "axis"), "N m-1", "sum of boundary_force along the side"),
         "confining_stress": Variable((), "Pa", "normal stress applied to the lateral sides, tension positive"),
+        "confining_stress_then": Variable(
+            _T, "Pa", "normal stress applied to the lateral sides at the state, where it changes", optional=True
+        ),
         "outline": Variable(("wall", "axis"), "m", "corners of the domain before consolidation"),
         "contact_count": Variable(_T, "1", "contacts of the state", dtype="i4"),
         "contact_block": Variable(("contact", "pair"), "1", "blocks of the contact", dtype="i4"),

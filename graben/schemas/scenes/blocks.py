@@ -2,32 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import model_validator
 
-from graben.schemas.quantities import (
-    Acceleration,
-    Angle,
-    Density,
-    JointStiffness,
-    Length,
-    Pressure,
-    PressureRate,
-    Speed,
-    Time,
-    key,
-)
+from graben.schemas.quantities import Angle, Density, JointStiffness, Length, Pressure, key
 from graben.schemas.scene import InputFile, Model, Scene
-
-Point = tuple[Length, Length]
-
-_SLOPE_SUPPORTS: Any = [
-    {"name": "left", "start": ["0 m", "0 m"], "end": ["0 m", "20 m"], "fix": "x"},
-    {"name": "right", "start": ["80 m", "0 m"], "end": ["80 m", "50 m"], "fix": "x"},
-    {"name": "base", "start": ["0 m", "0 m"], "end": ["80 m", "0 m"], "fix": "y"},
-]
-_SLOPE_LOADS: Any = [{"name": "backslope", "start": ["55 m", "50 m"], "end": ["60 m", "50 m"], "rate": "0.25 MPa/s"}]
+from graben.schemas.scenes.blocks_loading import Loading, Numerics, Point, Programme
 
 
 class Domain(Model):
@@ -124,77 +105,6 @@ class Joints(Model):
     )
 
 
-class Loading(Model):
-    """Confinement first, then the top moves down."""
-
-    confining_pressure: Pressure = key("0.5 MPa", "normal pressure on the left and right sides", gt=0)
-    vertical_ratio: float = key(0.5, "vertical over confining pressure during consolidation", gt=0)
-    speed: Speed = key("5 mm/s", "speed of the top, downwards", gt=0)
-    duration: Time = key("100 s", "time of loading", gt=0)
-    states: int = key(51, "saved states, the first before loading", ge=2)
-
-
-class Support(Model):
-    """No displacement along a segment of the outline."""
-
-    name: str = key("support", "name, for messages")
-    start: Point = key(..., "one end of the segment")
-    end: Point = key(..., "the other end")
-    fix: Literal["x", "y", "both"] = key("both", "displacement held at zero: x or y (a roller), or both")
-
-
-class Load(Model):
-    """Pressure on a part of the outline, dead: it keeps the direction and length of the undeformed outline."""
-
-    name: str = key("load", "name, for messages")
-    start: Point = key(..., "one end of the loaded segment")
-    end: Point = key(..., "the other end")
-    pressure: Pressure = key("0 Pa", "pressure from the start, applied with gravity; pushes into the body")
-    rate: PressureRate = key("0 Pa/s", "rise of the pressure after gravity", ge=0)
-
-
-class Programme(Model):
-    """Weight and steady pressures until rest, then pressures that rise until the rock fails; instead of [loading]."""
-
-    horizontal: Acceleration = key("0 m/s^2", "gravity along x")
-    vertical: Acceleration = key("-9.81 m/s^2", "gravity along y (upwards positive)")
-    supports: list[Support] = key(_SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)")
-    loads: list[Load] = key(_SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)")
-    end: Time = key("100 s", "time of rise after which the run ends without failure (waiting not counted)", gt=0)
-    save_every: Time = key("4 s", "time of rise between saved states", gt=0)
-    calm: float = key(
-        5e-3,
-        "loads rise while the mean unbalanced force over the mean zone force is below this, else they wait",
-        gt=0,
-    )
-    patience: int = key(
-        8000,
-        "steps of waiting after which the rock has failed, if the loaded ground still sinks faster than at first; "
-        "four times as many if it does not",
-        ge=1000,
-    )
-
-    @model_validator(mode="after")
-    def _something_holds(self) -> Programme:
-        if not self.supports:
-            raise ValueError("at least one support")
-        return self
-
-
-class Numerics(Model):
-    """Knobs that trade accuracy for time; left out, fidelity sets them."""
-
-    steps: int | None = key(
-        None, "steps of loading (of a programme's end): fewer means heavier scaled masses, so more inertia", gt=100
-    )
-    damping_ratio: float = key(0.5, "power of the adaptive damping over the rate of kinetic energy", gt=0)
-    consolidation_tolerance: float = key(1e-3, "unbalanced over mean zone force that ends consolidation", gt=0)
-    energy_limit: float = key(0.05, "largest error of the energy ledger over the work done", gt=0)
-    threads: int = key(
-        1, "threads that share a run out, with bitwise the same result; pays from 2000 blocks on", ge=1
-    )
-
-
 class Output(Model):
     """What is written beside the artifact."""
 
@@ -230,7 +140,7 @@ class BlocksScene(Scene):
             faults.append(f"tessellation.rounding of at most a quarter of the edge (found {t.rounding:.4g} m)")
         if t.shortest_edge is not None and t.shortest_edge > t.edge:
             faults.append(f"tessellation.shortest_edge below the edge (found {t.shortest_edge:.4g} m)")
-        strain = self.loading.speed * self.loading.duration / d.height
+        strain = self.loading.largest_travel / d.height
         if self.programme is not None and "loading" in self.model_fields_set:
             faults.append("either [loading] or [programme]")
         elif self.programme is None and d.outline is not None:

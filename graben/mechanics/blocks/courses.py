@@ -1,0 +1,62 @@
+"""Courses: quantities that run piecewise linearly over time, such as the speed of a wall or a pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+
+class Course:
+    """Straight lines between points (time, value); level before the first, rising by `rate` after the last.
+
+    Two points at one time make a jump. ValueError when times fall, or where there is no point.
+    """
+
+    def __init__(self, points: Sequence[tuple[float, float]], rate: float = 0.0) -> None:
+        table = np.array(points, dtype=float).reshape(-1, 2)
+        self.times, self.values = table[:, 0], table[:, 1]
+        if len(table) == 0 or not np.isfinite(table).all() or np.any(np.diff(self.times) < 0.0):
+            raise ValueError("a course needs points whose times do not fall")
+        self._rate = rate
+
+    def in_steps(self, dt: float) -> Course:
+        """The same course over steps of `dt`, its points moved to whole steps."""
+        return Course([(round(t / dt), v) for t, v in zip(self.times, self.values, strict=True)], self._rate * dt)
+
+    def at(self, time: float) -> float:
+        """Value; at a jump the one after it."""
+        k = int(np.searchsorted(self.times, time, side="right"))
+        j = max(k - 1, 0)
+        return float(self.values[j] + self.slope(time) * (time - self.times[j]))
+
+    def slope(self, time: float) -> float:
+        """Rise per unit of time from `time` on."""
+        k = int(np.searchsorted(self.times, time, side="right"))
+        if k == len(self.times):
+            return self._rate
+        return 0.0 if k == 0 else float(np.diff(self.values)[k - 1] / np.diff(self.times)[k - 1])
+
+    @property
+    def fastest_rate(self) -> float:
+        """Largest rise or fall per unit of time, jumps aside."""
+        rates = [abs(self.slope(t)) for t in self.times]
+        return max(rates)
+
+    @property
+    def changes(self) -> bool:
+        """Whether it ever leaves its first value."""
+        return self._rate != 0.0 or bool(np.any(self.values != self.values[0]))
+
+    def next_point(self, time: float) -> float:
+        """Time of the next point; infinite after the last."""
+        k = int(np.searchsorted(self.times, time, side="right"))
+        return float(self.times[k]) if k < len(self.times) else float("inf")
+
+    def integral(self, time: float) -> float:
+        """Integral from 0 to `time`, exact."""
+        inner = self.times[(self.times > 0.0) & (self.times < time)]
+        marks = np.concatenate([[0.0], np.unique(inner), [time]])
+        # Between two marks it is straight: the value in the middle is the mean.
+        return float(sum((b - a) * self.at(0.5 * (a + b)) for a, b in pairwise(marks)))

@@ -1,0 +1,202 @@
+"""Loading of blocks: biaxial compression or a programme of supports and pressures, and the numerics of both."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any, Literal
+
+from pydantic import model_validator
+
+from graben.schemas.quantities import (
+    Acceleration,
+    Frequency,
+    Length,
+    Pressure,
+    PressureRate,
+    Speed,
+    Time,
+    key,
+)
+from graben.schemas.scene import Model
+
+Point = tuple[Length, Length]
+SpeedCourse = list[tuple[Time, Speed]]
+PressureCourse = list[tuple[Time, Pressure]]
+
+_SLOPE_SUPPORTS: Any = [
+    {"name": "left", "start": ["0 m", "0 m"], "end": ["0 m", "20 m"], "fix": "x"},
+    {"name": "right", "start": ["80 m", "0 m"], "end": ["80 m", "50 m"], "fix": "x"},
+    {"name": "base", "start": ["0 m", "0 m"], "end": ["80 m", "0 m"], "fix": "y"},
+]
+_SLOPE_LOADS: Any = [{"name": "backslope", "start": ["55 m", "50 m"], "end": ["60 m", "50 m"], "rate": "0.25 MPa/s"}]
+
+
+class Loading(Model):
+    """Confinement first, then the top moves down."""
+
+    confining_pressure: Pressure = key("0.5 MPa", "normal pressure on the left and right sides", gt=0)
+    vertical_ratio: float = key(0.5, "vertical over confining pressure during consolidation", gt=0)
+    speed: Speed = key("5 mm/s", "speed of the top, downwards", gt=0)
+    speed_course: SpeedCourse | None = key(
+        None,
+        "speed of the top over time instead of speed: points [time, speed], straight between them, negative upwards; "
+        "two points at one time make a jump",
+        min_length=1,
+    )
+    confining_course: PressureCourse | None = key(
+        None,
+        "confining pressure over time: points [time, pressure], straight between them; begins with "
+        "confining_pressure at 0 s",
+        min_length=1,
+    )
+    duration: Time = key("100 s", "time of loading", gt=0)
+    states: int = key(51, "saved states, the first before loading", ge=2)
+
+    @property
+    def largest_travel(self) -> float:
+        """Farthest that the top gets from where it was [m]."""
+        if self.speed_course is None:
+            return self.speed * self.duration
+        course = [(0.0, self.speed_course[0][1]), *self.speed_course, (self.duration, self.speed_course[-1][1])]
+        travel, farthest = 0.0, 0.0
+        for (t0, v0), (t1, v1) in pairwise(course):
+            if t0 >= min(t1, self.duration):
+                continue
+            if t1 > self.duration:
+                t1, v1 = self.duration, v0 + (v1 - v0) * (self.duration - t0) / (t1 - t0)
+            # Where the speed turns, the travel is at its extreme.
+            turn = t0 - v0 * (t1 - t0) / (v1 - v0) if v0 * v1 < 0.0 else t1
+            farthest = max(farthest, abs(travel + 0.5 * v0 * (turn - t0)) if v0 * v1 < 0.0 else 0.0)
+            travel += 0.5 * (v0 + v1) * (t1 - t0)
+            farthest = max(farthest, abs(travel))
+        return farthest
+
+    @model_validator(mode="after")
+    def _courses(self) -> Loading:
+        faults = []
+        if self.speed_course is not None:
+            if "speed" in self.model_fields_set:
+                faults.append("either speed or speed_course")
+            faults += _course_faults("speed_course", self.speed_course)
+            if not any(speed for _, speed in self.speed_course):
+                faults.append("speed_course with a speed other than 0")
+        if self.confining_course is not None:
+            faults += _course_faults("confining_course", self.confining_course)
+            if self.confining_course[0] != (0.0, self.confining_pressure):
+                faults.append("confining_course that begins at 0 s with confining_pressure")
+            if any(pressure <= 0.0 for _, pressure in self.confining_course):
+                faults.append("confining_course of positive pressures")
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
+
+
+class Support(Model):
+    """No displacement along a segment of the outline."""
+
+    name: str = key("support", "name, for messages")
+    start: Point = key(..., "one end of the segment")
+    end: Point = key(..., "the other end")
+    fix: Literal["x", "y", "both"] = key("both", "displacement held at zero: x or y (a roller), or both")
+
+
+class Load(Model):
+    """Pressure on a part of the outline, dead: it keeps the direction and length of the undeformed outline."""
+
+    name: str = key("load", "name, for messages")
+    start: Point = key(..., "one end of the loaded segment")
+    end: Point = key(..., "the other end")
+    pressure: Pressure = key("0 Pa", "pressure from the start, applied with gravity; pushes into the body")
+    rate: PressureRate = key("0 Pa/s", "rise of the pressure after gravity", ge=0)
+    course: PressureCourse | None = key(
+        None,
+        "pressure over the time of loading instead of pressure and rate: points [time, pressure], straight between "
+        "them; the first one is applied with gravity",
+        min_length=1,
+    )
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Load:
+        faults = []
+        if self.course is not None:
+            if self.model_fields_set & {"pressure", "rate"}:
+                faults.append("either course, or pressure and rate")
+            faults += _course_faults("course", self.course)
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
+
+
+class Programme(Model):
+    """Weight and steady pressures until rest, then pressures that rise until the rock fails; instead of [loading]."""
+
+    horizontal: Acceleration = key("0 m/s^2", "gravity along x")
+    vertical: Acceleration = key("-9.81 m/s^2", "gravity along y (upwards positive)")
+    supports: list[Support] = key(_SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)")
+    loads: list[Load] = key(_SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)")
+    end: Time = key("100 s", "time of rise after which the run ends without failure (waiting not counted)", gt=0)
+    save_every: Time = key("4 s", "time of rise between saved states", gt=0)
+    calm: float = key(
+        5e-3,
+        "loads rise while the mean unbalanced force over the mean zone force is below this, else they wait",
+        gt=0,
+    )
+    patience: int = key(
+        8000,
+        "steps of waiting after which the rock has failed, if the loaded ground still sinks faster than at first; "
+        "four times as many if it does not",
+        ge=1000,
+    )
+
+    @model_validator(mode="after")
+    def _something_holds(self) -> Programme:
+        if not self.supports:
+            raise ValueError("at least one support")
+        return self
+
+
+class Numerics(Model):
+    """Knobs that trade accuracy for time; left out, fidelity sets them."""
+
+    steps: int | None = key(
+        None, "steps of loading (of a programme's end): fewer means heavier scaled masses, so more inertia", gt=100
+    )
+    damping: Literal["adaptive", "local", "viscous"] = key(
+        "adaptive",
+        "adaptive: a global drag that follows the rate of kinetic energy; local: against each unbalanced force (0.8 "
+        "gives strengths of 9 to 16 MPa where 6.6 is right); viscous: a drag of fixed coefficient",
+    )
+    damping_ratio: float = key(0.5, "adaptive: power of the damping over the rate of kinetic energy", gt=0)
+    damping_share: float | None = key(
+        None, "local: share of the unbalanced force taken off against the velocity", gt=0, lt=1
+    )
+    damping_coefficient: Frequency | None = key(
+        None, "viscous: drag over (scaled) mass and velocity, at most one over the time step", ge=0
+    )
+    consolidation_tolerance: float = key(1e-3, "unbalanced over mean zone force that ends consolidation", gt=0)
+    energy_limit: float = key(0.05, "largest error of the energy ledger over the work done", gt=0)
+    threads: int = key(
+        1, "threads that share a run out, with bitwise the same result; pays from 2000 blocks on", ge=1
+    )
+
+    @model_validator(mode="after")
+    def _one_damping(self) -> Numerics:
+        kinds = {"damping_ratio": "adaptive", "damping_share": "local", "damping_coefficient": "viscous"}
+        faults = [
+            f'damping = "{kind}" for {name} (found "{self.damping}")'
+            for name, kind in kinds.items()
+            if name in self.model_fields_set and getattr(self, name) is not None and kind != self.damping
+        ]
+        for name, kind in kinds.items():
+            if self.damping == kind and getattr(self, name) is None:
+                faults.append(f'{name}, because damping = "{kind}"')
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
+
+
+def _course_faults(name: str, course: list[tuple[float, float]]) -> list[str]:
+    times = [time for time, _ in course]
+    if times[0] < 0.0 or times != sorted(times):
+        return [f"{name} with times from 0 s on that do not fall"]
+    return []
