@@ -49,7 +49,7 @@ def test_a_column_unloads_along_its_modulus_and_feels_the_confinement():
     pressure = Course([(0, 1e5), (4200, 1e5), (4800, 3e5)])
     joint = Joint(KN, KN, 0.0, 1e12, 1e12, 0.0, np.inf)
     model, d = loaded(column(), joint, Courses(speed, pressure), steps)
-    sigma = mean_stress(d["zone_stress"], model.skeleton.area, model.skeleton.area > 0.0)
+    sigma = mean_stress(d["zone_stress"], model.zone_area, model.zone_area > 0.0)
     strain = np.array([speed.integral(n) for n in np.linspace(0, steps, 31)]) * DT / height
     # Contacts are shorter than edges by two roundings.
     kn = KN * (1.0 - 2e-3 / S)
