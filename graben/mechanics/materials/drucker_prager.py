@@ -34,9 +34,36 @@ import math
 import numpy as np
 
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.drucker_prager_parameters import PARAMETERS, check
+from graben.mechanics.materials.drucker_prager_parameters import (
+    BETA,
+    D3,
+    DAMAGE,
+    DMAX,
+    E50,
+    E60,
+    EPEAK,
+    GAIN,
+    HARD_A,
+    HARD_B,
+    KIND,
+    LOG_D2,
+    NU,
+    PARAMETERS,
+    PEAK,
+    PSI,
+    RATE,
+    SIGMA0,
+    SLOPE,
+    TAN_BETA,
+    TAN_PSI,
+    UF,
+    E,
+    K,
+    check,
+)
+from graben.mechanics.materials.drucker_prager_return import ROOT32, apex_flow, bisect, newton, yield_stress
 from graben.mechanics.materials.elastic import add_elastic, fill_elastic, finite, moduli
-from graben.mechanics.materials.hardening import BARCELONA, EXPONENTIAL, barcelona_coefficients, harden
+from graben.mechanics.materials.hardening import BARCELONA, EXPONENTIAL, barcelona_coefficients
 from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law
 from graben.mechanics.materials.principal import (
     back_plane_stress,
@@ -48,167 +75,28 @@ from graben.mechanics.materials.principal import (
     split_space,
 )
 
-# slots of par, in the order of PARAMETERS; then the derived values; then the table
-_E, _NU, _BETA, _PSI, _K, _KIND, _SIGMA0, _GAIN, _RATE, _PEAK, _EPEAK, _SLOPE, _DAMAGE, _E50, _E60, _UF, _DMAX = (
-    range(17)
-)
-_TAN_BETA, _TAN_PSI, _HARD_A, _HARD_B, _LOG_D2, _D3, _TABLE = range(17, 24)
-
 _ROOT2, _ROOT3, _ROOT6, _ROOT13 = math.sqrt(2.0), math.sqrt(3.0), math.sqrt(6.0), math.sqrt(1.0 / 3.0)
-_ROOT32 = math.sqrt(1.5)
 _SIXTH_TURN = math.pi / 3.0
-_TAN_LIMIT = math.degrees(math.atan(3.0))  # beta where 1 - tan(beta)/3 vanishes
 
 
 @kernel(error_model="numpy")
 def prepare_drucker_prager(par):
     """Fill the derived slots of par: tangents of the angles, hardening coefficients, damage coefficients."""
-    par[_TAN_BETA] = math.tan(par[_BETA])
-    par[_TAN_PSI] = math.tan(par[_PSI])
-    kind = int(par[_KIND])
-    par[_HARD_A], par[_HARD_B] = 0.0, 0.0
+    par[TAN_BETA] = math.tan(par[BETA])
+    par[TAN_PSI] = math.tan(par[PSI])
+    kind = int(par[KIND])
+    par[HARD_A], par[HARD_B] = 0.0, 0.0
     if kind == EXPONENTIAL:
-        par[_HARD_A], par[_HARD_B] = par[_GAIN], par[_RATE]
+        par[HARD_A], par[HARD_B] = par[GAIN], par[RATE]
     elif kind == BARCELONA:
-        par[_HARD_A], par[_HARD_B] = barcelona_coefficients(par[_SIGMA0], par[_PEAK], par[_EPEAK])
+        par[HARD_A], par[HARD_B] = barcelona_coefficients(par[SIGMA0], par[PEAK], par[EPEAK])
     else:
-        par[_HARD_A] = par[_SLOPE]
-    par[_LOG_D2], par[_D3] = 0.0, 0.0
-    if par[_DAMAGE] != 0.0:
-        log50, log60 = math.log(par[_E50]), math.log(par[_E60])
-        par[_LOG_D2] = 6.0 * log50 - 5.0 * log60
-        par[_D3] = 10.0 * (log50 - log60)
-
-
-@kernel(error_model="numpy")
-def _yield_stress(strain, par):
-    """(1 - tan(beta)/3) sigma_c and its slope."""
-    value, slope = harden(int(par[_KIND]), strain, par[_SIGMA0], par[_HARD_A], par[_HARD_B], par, _TABLE)
-    factor = 1.0 - par[_TAN_BETA] / 3.0
-    return factor * value, factor * slope
-
-
-@kernel(error_model="numpy")
-def _shape(theta, k):
-    """h(theta) and its first and second derivative."""
-    cos3 = math.cos(3.0 * theta)
-    return 1.0 + 0.5 * k * (1.0 + cos3), -1.5 * k * math.sin(3.0 * theta), -4.5 * k * cos3
-
-
-@kernel(error_model="numpy")
-def _newton(p, rho, c3, s3, strain, d, slope, bulk, flow, k, par):
-    """Smooth part of the surface by Newton: (found, dlambda, cos, sin of the turn th - th_tr).
-
-    c3, s3: cos and sin of 3 th_tr; d, slope: yield term at `strain`; flow = sqrt(6) mu. The turn is carried
-    as the tangent of its half, which needs no trigonometry.
-    """
-    tan_b, tan_p = par[_TAN_BETA], par[_TAN_PSI]
-    rate = 1.0 - tan_p / 3.0
-    size = _ROOT32 * rho + abs(p) * tan_b + d
-    half, multiplier = 0.0, 0.0
-    for _iteration in range(14):
-        scale = 1.0 / (1.0 + half * half)
-        c, s = (1.0 - half * half) * scale, 2.0 * half * scale
-        triple_c, triple_s = c * (4.0 * c * c - 3.0), s * (3.0 - 4.0 * s * s)
-        cos3, sin3 = c3 * triple_c - s3 * triple_s, s3 * triple_c + c3 * triple_s
-        h, h1, h2 = 1.0 + 0.5 * k * (1.0 + cos3), -1.5 * k * sin3, -4.5 * k * cos3
-        a = flow * multiplier
-        radius = rho * c - a * h
-        turn = rho * s + a * h1
-        excess = _ROOT32 * radius * h - tan_b * (p + bulk * tan_p * multiplier) - d
-        close = multiplier > 0.0 and abs(turn) <= 1e-8 * rho and abs(excess) <= 1e-8 * size
-        tt = rho * c + a * h2
-        tm = flow * h1
-        et = _ROOT32 * (radius * h1 - turn * h)
-        em = -_ROOT32 * flow * h * h - tan_b * tan_p * bulk - slope * rate
-        det = tt * em - tm * et
-        if det == 0.0:
-            break
-        half -= (turn * em - tm * excess) / (2.0 * det * scale)
-        multiplier -= (tt * excess - et * turn) / det
-        if not (0.0 <= multiplier < 1e30 and abs(half) < 0.6):
-            break
-        if close:  # the step just taken squares the error: nothing is left to check
-            scale = 1.0 / (1.0 + half * half)
-            fits = radius >= 0.0 and sin3 >= -1e-9 and half >= -1e-9
-            return fits, multiplier, (1.0 - half * half) * scale, 2.0 * half * scale
-        d, slope = _yield_stress(strain + rate * multiplier, par)
-    return False, 0.0, 1.0, 0.0
-
-
-@kernel(error_model="numpy")
-def _turned(rho, theta, a, k):
-    """Lode angle after the return with a given a, by safeguarded Newton in [theta, pi/3]."""
-    low, high = theta, _SIXTH_TURN
-    angle = theta
-    for _iteration in range(100):
-        _h, h1, h2 = _shape(angle, k)
-        turn = rho * math.sin(angle - theta) + a * h1
-        if turn > 0.0:
-            high = angle
-        else:
-            low = angle
-        if turn == 0.0 or high - low < 1e-16:
-            break
-        tt = rho * math.cos(angle - theta) + a * h2
-        angle = angle - turn / tt if tt > 0.0 else -1.0
-        if not low < angle < high:
-            angle = 0.5 * (low + high)
-    return angle
-
-
-@kernel(error_model="numpy")
-def _bisect(p, rho, theta, strain, bulk, flow, k, par):
-    """Return by nested bisection: (state, dlambda, theta), state 0 smooth, 1 apex, 2 failed."""
-    tan_b, tan_p = par[_TAN_BETA], par[_TAN_PSI]
-    rate = 1.0 - tan_p / 3.0
-    low, high = 0.0, rho / flow  # h >= 1, so the deviator is gone at a = rho at the latest
-    angle = theta
-    smooth = False
-    for _iteration in range(200):
-        middle = 0.5 * (low + high)
-        if middle <= low or middle >= high:
-            break
-        angle = _turned(rho, theta, flow * middle, k)
-        h, _h1, _h2 = _shape(angle, k)
-        radius = rho * math.cos(angle - theta) - flow * middle * h
-        d, _slope = _yield_stress(strain + rate * middle, par)
-        excess = _ROOT32 * radius * h - tan_b * (p + bulk * tan_p * middle) - d
-        if radius > 0.0 and excess > 0.0:
-            low = middle
-        else:
-            high = middle
-            smooth = radius > 0.0
-        if high - low <= 1e-15 * high:
-            break
-    if smooth:
-        return 0, high, _turned(rho, theta, flow * high, k)
-    return 1, high, angle
-
-
-@kernel(error_model="numpy")
-def _apex_flow(p, strain, bulk, par):
-    """Volumetric plastic strain v >= 0 that brings a purely volumetric stress at pressure p to the apex."""
-    tan_b = par[_TAN_BETA]
-    if tan_b <= 0.0:
-        return 0.0
-    rate = (1.0 - par[_TAN_PSI] / 3.0) / tan_b
-    low, high = 0.0, max(0.0, -p / bulk)
-    flow = 0.0
-    for _iteration in range(120):
-        d, slope = _yield_stress(strain + rate * flow, par)
-        excess = -tan_b * (p + bulk * flow) - d
-        if excess > 0.0:
-            low = flow
-        else:
-            high = flow
-        if high - low <= 1e-16 * high or abs(excess) <= 1e-15 * d:
-            break
-        step = tan_b * bulk + slope * rate
-        flow = flow + excess / step if step > 0.0 else -1.0
-        if not low < flow < high:
-            flow = 0.5 * (low + high)
-    return flow
+        par[HARD_A] = par[SLOPE]
+    par[LOG_D2], par[D3] = 0.0, 0.0
+    if par[DAMAGE] != 0.0:
+        log50, log60 = math.log(par[E50]), math.log(par[E60])
+        par[LOG_D2] = 6.0 * log50 - 5.0 * log60
+        par[D3] = 10.0 * (log50 - log60)
 
 
 @kernel(error_model="numpy")
@@ -219,21 +107,21 @@ def _damage(state, gain, eta, length, par):
     Returns d(damage)/d(gain) and d(damage)/d(eta).
     """
     eta = min(max(eta, -10.0), 10.0)
-    exponent = min(max(par[_LOG_D2] + par[_D3] * eta, -60.0), 60.0)
+    exponent = min(max(par[LOG_D2] + par[D3] * eta, -60.0), 60.0)
     strain_f = math.exp(exponent)
     before = state[2]
     state[2] = before + gain / strain_f
-    if state[2] <= 1.0 or state[1] >= par[_DMAX]:
+    if state[2] <= 1.0 or state[1] >= par[DMAX]:
         return 0.0, 0.0
     left = max(0.0, 1.0 - before) * strain_f  # the part of gain spent before initiation
-    speed = length / par[_UF]
+    speed = length / par[UF]
     damage = state[1] + speed * (gain - left)
-    if damage >= par[_DMAX]:
-        state[1] = par[_DMAX]
+    if damage >= par[DMAX]:
+        state[1] = par[DMAX]
         return 0.0, 0.0
     state[1] = damage
     bounded = abs(eta) < 10.0 and abs(exponent) < 60.0
-    return speed, -speed * left * par[_D3] if bounded else 0.0
+    return speed, -speed * left * par[D3] if bounded else 0.0
 
 
 @kernel(error_model="numpy")
@@ -252,9 +140,9 @@ def _return(s1, s2, s3, d, slope, bulk, shear, state, par, length, tangent):
     d, slope: yield term at the strain so far. Called only where the trial stress lies outside the yield
     surface.
     """
-    tan_b, tan_p = par[_TAN_BETA], par[_TAN_PSI]
+    tan_b, tan_p = par[TAN_BETA], par[TAN_PSI]
     rate = 1.0 - tan_p / 3.0
-    k = 1.0 / par[_K] - 1.0
+    k = 1.0 / par[K] - 1.0
     flow = _ROOT6 * shear
     p_trial = -(s1 + s2 + s3) / 3.0
     d1, d2, d3 = s1 + p_trial, s2 + p_trial, s3 + p_trial
@@ -266,14 +154,14 @@ def _return(s1, s2, s3, d, slope, bulk, shear, state, par, length, tangent):
     v1, v2, v3 = -g23 * _ROOT13, g13 * _ROOT13, -g12 * _ROOT13
     cos3, sin3 = 3.0 * _ROOT6 * u1 * u2 * u3, _ROOT2 * g12 * g23 * g13
     strain = state[0]
-    found, multiplier, c, s = _newton(p_trial, rho_trial, cos3, sin3, strain, d, slope, bulk, flow, k, par)
+    found, multiplier, c, s = newton(p_trial, rho_trial, cos3, sin3, strain, d, slope, bulk, flow, k, par)
     apex = False
     if not found:
         theta_trial = min(math.atan2(_ROOT3 * g23, 3.0 * u1), _SIXTH_TURN)
-        which, multiplier, theta = _bisect(p_trial, rho_trial, theta_trial, strain, bulk, flow, k, par)
+        which, multiplier, theta = bisect(p_trial, rho_trial, theta_trial, strain, bulk, flow, k, par)
         apex = which == 1
         c, s = math.cos(theta - theta_trial), math.sin(theta - theta_trial)
-    # the shape function at the end, by the same angle sums as in _newton
+    # the shape function at the end, by the same angle sums as in newton
     triple_c, triple_s = c * (4.0 * c * c - 3.0), s * (3.0 - 4.0 * s * s)
     cos3, sin3 = cos3 * triple_c - sin3 * triple_s, sin3 * triple_c + cos3 * triple_s
     h, h1, h2 = 1.0 + 0.5 * k * (1.0 + cos3), -1.5 * k * sin3, -4.5 * k * cos3
@@ -282,7 +170,7 @@ def _return(s1, s2, s3, d, slope, bulk, shear, state, par, length, tangent):
     rho = 0.0
     extra = 0.0
     if apex:
-        extra = _apex_flow(p, strain + rate * multiplier, bulk, par)
+        extra = apex_flow(p, strain + rate * multiplier, bulk, par)
         p += bulk * extra
     else:
         rho = rho_trial * c - a * h
@@ -295,14 +183,14 @@ def _return(s1, s2, s3, d, slope, bulk, shear, state, par, length, tangent):
         return NOT_CONVERGED, s1, s2, s3
     state[0] = strain + gain
     per_gain, per_eta = 0.0, 0.0
-    q = _ROOT32 * rho
-    if par[_DAMAGE] != 0.0:
+    q = ROOT32 * rho
+    if par[DAMAGE] != 0.0:
         eta = -p / q if q > 1e-12 * abs(p) else (10.0 if p < 0.0 else -10.0)
         per_gain, per_eta = _damage(state, gain, eta, length, par)
     keep = 1.0 - state[1]
     if tangent.shape[0] == 0:
         return OK, keep * e1, keep * e2, keep * e3
-    _d, slope = _yield_stress(state[0], par)
+    _d, slope = yield_stress(state[0], par)
     stress, radial = (e1, e2, e3), (r1, r2, r3)
     twice = 2.0 * shear
     if apex:
@@ -318,14 +206,14 @@ def _return(s1, s2, s3, d, slope, bulk, shear, state, par, length, tangent):
         return OK, keep * e1, keep * e2, keep * e3
     m = 1.0 / (1.0 + a * (h + h2) / rho) if rho > 0.0 else 0.0
     turn = m * h1
-    stiff = _ROOT32 * flow * (h * h + h1 * turn) + tan_b * tan_p * bulk + slope * rate
+    stiff = ROOT32 * flow * (h * h + h1 * turn) + tan_b * tan_p * bulk + slope * rate
     weak = 1.0 / stiff if stiff != 0.0 else 0.0
     t1, t2, t3 = c * v1 - s * u1, c * v2 - s * u2, c * v3 - s * u3
     around = (t1, t2, t3)
     n1, n2, n3 = h * r1 + turn * t1, h * r2 + turn * t2, h * r3 + turn * t3
     normal = (n1, n2, n3)
     for j in range(3):
-        lam = (_ROOT32 * twice * normal[j] + tan_b * bulk) * weak
+        lam = (ROOT32 * twice * normal[j] + tan_b * bulk) * weak
         dp = -bulk + bulk * tan_p * lam
         dd = per_gain * rate * lam
         if per_eta != 0.0:
@@ -341,7 +229,7 @@ def update_drucker_prager(deps, sig, state, par, length, tangent):
     """The law `drucker-prager`; arguments and return code as in `laws.update`."""
     if not (finite(deps) and finite(sig)):
         return NOT_FINITE
-    bulk, shear = moduli(par[_E], par[_NU])
+    bulk, shear = moduli(par[E], par[NU])
     keep = 1.0 - state[1]
     n = sig.shape[0]
     old0, old1, old2, old3 = sig[0], sig[1], sig[2], sig[3]
@@ -354,14 +242,14 @@ def update_drucker_prager(deps, sig, state, par, length, tangent):
     d0, d1, d2 = x0 + p, x1 + p, x2 + p
     q2 = 1.5 * (d0 * d0 + d1 * d1 + d2 * d2 + 2.0 * (x3 * x3 + x4 * x4 + x5 * x5))
     q = math.sqrt(q2)
-    k = 1.0 / par[_K] - 1.0
+    k = 1.0 / par[K] - 1.0
     cos3 = 0.0
     if k != 0.0 and q > 0.0:
         det = d0 * (d1 * d2 - x4 * x4) - x3 * (x3 * d2 - x4 * x5) + x5 * (x3 * x4 - d1 * x5)
         cos3 = 13.5 * det / (q2 * q)
     t = q * (1.0 + 0.5 * k * (1.0 + cos3))
-    d, slope = _yield_stress(state[0], par)
-    friction = p * par[_TAN_BETA]
+    d, slope = yield_stress(state[0], par)
+    friction = p * par[TAN_BETA]
     if t - friction - d <= 1e-13 * (t + abs(friction) + d):
         fill_elastic(keep, bulk, shear, tangent)
         return OK

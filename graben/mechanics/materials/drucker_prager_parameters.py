@@ -13,6 +13,10 @@ from graben.mechanics.materials.elastic import POISSON, YOUNG
 from graben.mechanics.materials.hardening import CHOICES
 from graben.mechanics.materials.law import Parameter
 
+# slots of par, in the order of PARAMETERS; then the derived values; then the table
+E, NU, BETA, PSI, K, KIND, SIGMA0, GAIN, RATE, PEAK, EPEAK, SLOPE, DAMAGE, E50, E60, UF, DMAX = range(17)
+TAN_BETA, TAN_PSI, HARD_A, HARD_B, LOG_D2, D3, TABLE = range(17, 24)
+
 
 def check(values: Mapping[str, Any]) -> list[str]:
     found = []

@@ -24,6 +24,11 @@ _NEWTON = 12
 @kernel(error_model="numpy")
 def solve_small(a, b, m):
     """Solve a[:m, :m] x = b[:m] by elimination with pivoting, x into b. False when singular."""
+    if m == 1:  # a test under one constant lateral stress, which most paths are
+        if a[0, 0] == 0.0:
+            return False
+        b[0] /= a[0, 0]
+        return abs(b[0]) < 1e100
     for i in range(m):
         pivot = i
         for r in range(i + 1, m):
@@ -52,13 +57,15 @@ def solve_small(a, b, m):
 
 @kernel(error_model="numpy")
 def increment(
-    law_id, par, length, tolerance, free, m, change, sig, state, eps, tangent, old_sig, old_state, deps, a, b
+    law_id, par, length, tolerance, free, m, change, sig, state, eps, tangent, old_sig, old_state, deps, bend, a, b
 ):
     """One increment: change[i] is the strain change, or the new stress of a component under stress control.
 
     free[:m] lists the components under stress control. tangent holds the one of the last increment (the
-    predictor) and gets the new one. sig, state, eps change in place on success; on failure they are as before
-    and False is returned.
+    predictor) and gets the new one. bend (n + 1,) holds by how much the last predictor missed the strains under
+    stress control, and the size of that increment: a miss grows as the square of the size, which makes the next
+    predictor one order better. sig, state, eps change in place on success; on failure they are as before and
+    False is returned.
     """
     n = sig.shape[0]
     for i in range(n):
@@ -86,6 +93,16 @@ def increment(
         if solve_small(a, b, m):
             for i in range(m):
                 deps[free[i]] = b[i]
+        stride = 0.0
+        for i in range(n):
+            stride += abs(deps[i])
+        ratio = stride / bend[n] if bend[n] > 0.0 else 0.0
+        grown = ratio * ratio if ratio < 2.0 else 0.0
+        bend[n] = stride
+        for i in range(m):
+            foreseen = grown * bend[i]
+            bend[i] = deps[free[i]]
+            deps[free[i]] += foreseen
     for _iteration in range(_NEWTON):
         code = update(law_id, deps, sig, state, par, length, tangent)
         if code != OK:
@@ -100,6 +117,8 @@ def increment(
         if worst <= tolerance * size:
             for i in range(n):
                 eps[i] += deps[i]
+            for i in range(m):
+                bend[i] = deps[free[i]] - bend[i]
             return True
         for i in range(m):
             row = free[i]
@@ -143,6 +162,7 @@ def drive(
     work = np.empty((4, n))
     change, deps, b, old_sig = work[0], work[1], work[2], work[3]
     old_state = np.empty(state.shape[0])
+    bend = np.zeros(n + 1)
     a = np.empty((n, n))
     tangent = np.empty((n, n))
     # the elastic tangent, or the reloading one, as the first predictor
@@ -170,12 +190,13 @@ def drive(
                     change[i] = now + (done + size) * full if control[i] == 1 else size * full
                 if increment(
                     law_id, par, length, tolerance, free, m, change, sig, state, eps, tangent, old_sig, old_state,
-                    deps, a, b,
+                    deps, bend, a, b,
                 ):  # fmt: skip
                     done += size
                     size = min(2.0 * size, 1.0 / parts)
                 else:
                     # the tangent of a failed trial is no predictor: take the one at rest
+                    bend[:] = 0.0
                     for i in range(n):
                         change[i] = 0.0
                         old_sig[i] = sig[i]
