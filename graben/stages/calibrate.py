@@ -86,7 +86,8 @@ def run(
         objective, found = problem.solve(
             measured, problem.plan, state, "all curves", lambda part, words: progress(share * part, words)
         )
-        fit, values = objective.fit, problem.box.to_values(found.best.x)
+        fit = objective.fit
+        values = fit.used(problem.box.to_values(found.best.x))
         errors = fit.errors(values)
         holdout, candidates = None, []
         if folds:

@@ -36,7 +36,7 @@ def arrays_of(
     every = [*measured, *unseen]
     whole = problem.fit(every) if unseen else fit
     steps = max(len(c.stress) for c in every)
-    sets = box.to_values(np.concatenate([box.to_unit(values)[None], members]))
+    sets = np.array([values, *(fit.used(v) for v in box.to_values(members))])
     predicted = whole.predict(np.concatenate([values[None], sets[1:]]))
     all_errors = whole.errors(values) if unseen else errors
     shape = (len(every), steps, 4)

@@ -82,6 +82,8 @@ _SIXTH_TURN = math.pi / 3.0
 @kernel(error_model="numpy")
 def prepare_drucker_prager(par):
     """Fill the derived slots of par: tangents of the angles, hardening coefficients, damage coefficients."""
+    par[PSI] = min(par[PSI], par[BETA])
+    par[PEAK] = max(par[PEAK], par[SIGMA0]) if int(par[KIND]) == BARCELONA else par[PEAK]
     par[TAN_BETA] = math.tan(par[BETA])
     par[TAN_PSI] = math.tan(par[PSI])
     kind = int(par[KIND])

@@ -20,6 +20,8 @@ TAN_BETA, TAN_PSI, HARD_A, HARD_B, LOG_D2, D3, TABLE = range(17, 24)
 
 def check(values: Mapping[str, Any]) -> list[str]:
     found = []
+    if values.get("dilation_angle", 0.0) > values["friction_angle"]:
+        found.append("dilation_angle at most friction_angle, otherwise flow under pressure yields work")
     barcelona = values.get("hardening", "exponential") == "barcelona"
     if barcelona and values["peak_yield"] < values.get("initial_yield", 0.0):
         found.append("peak_yield at least initial_yield")
@@ -46,7 +48,7 @@ PARAMETERS = (
         0.0,
         math.radians(71.0),
         0.0,
-        "slope of the flow potential in the p-t plane",
+        "slope of the flow potential in the p-t plane, at most the friction angle",
         "5 to 40 deg",
     ),
     Parameter(

@@ -57,7 +57,8 @@ class Law:
 
     initial_state(par) gives the (m,) state array of the unstressed material; state[0] is the equivalent plastic
     strain and state[1] the damage where a law has them. prepare(par) fills the derived slots in place.
-    check(values) returns texts for faults that concern several parameters at once.
+    check(values) returns texts for faults that concern several parameters at once. A search asks for such values
+    too: prepare moves one of them, in place, to the nearest that check allows.
     """
 
     id: int

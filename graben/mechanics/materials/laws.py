@@ -40,7 +40,7 @@ from graben.mechanics.materials.erve import ERVE, update_erve
 from graben.mechanics.materials.j2 import J2, update_j2
 from graben.mechanics.materials.law import UNKNOWN_LAW, Law
 from graben.mechanics.materials.lubliner import LUBLINER, prepare_lubliner, update_lubliner
-from graben.mechanics.materials.mohr_coulomb import MOHR_COULOMB, update_mohr_coulomb
+from graben.mechanics.materials.mohr_coulomb import MOHR_COULOMB, prepare_mohr_coulomb, update_mohr_coulomb
 from graben.mechanics.materials.transverse import TRANSVERSE, prepare_transverse, update_transverse
 
 _RECORDS: tuple[Law, ...] = (
@@ -84,6 +84,8 @@ def prepare(law_id, par):
     """Fill the derived slots of par after its parameters changed (a search changes them in compiled code)."""
     if law_id == 3:
         prepare_drucker_prager(par)
+    elif law_id == 2:
+        prepare_mohr_coulomb(par)
     elif law_id == 4:
         prepare_lubliner(par)
     elif law_id == 6:

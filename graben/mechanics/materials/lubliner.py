@@ -13,6 +13,14 @@ smallest plastic principal strain: dkt = r de_max, dkc = -(1 - r) de_min with r 
 them by fracture energies instead, which curves given over strain do not need. Damage: 1 - D = (1 - st Dc)(1 -
 sc Dt), Y (2.47), st = 1 - wt r, sc = 1 - wc (1 - r): with wc = 1 cracks that close carry compression again.
 
+Flow dissipates, s : de_p = dlambda (q^2 / n - p tan psi) with n^2 = (e s0 tan psi)^2 + q^2, as long as psi is not
+steeper than the flattest meridian of F under pressure, the tensile one: q >= p tan psi needs
+
+    tan psi <= 3 (3 A + gamma) / (3 + 2 gamma).
+
+Steeper ones are refused. What is left is the rounding of G's tip: where crushing or cracking has used up the
+strength, s : de_p may fall to -0.301 e s0 tan psi dlambda, 0.301 being the largest of y / (m (m + y)), m^2 = 1 + y^2.
+
 Return mapping: G does not depend on the Lode angle, so the deviator shrinks along itself and every quantity
 at the end of the increment is an explicit function of one multiplier. F is solved for it inside a bracket,
 which always exists because psi > 0. The tangent differentiates these explicit functions by differences, and
@@ -52,10 +60,19 @@ _A, _GAMMA, _ALPHA, _BETA, _M, _N, _TAN = range(18, 25)
 
 
 @kernel(error_model="numpy")
+def steepest_dilation(kc, f0):
+    """Largest psi with which flow under pressure dissipates: the slope of the tensile meridian, see above."""
+    a, gamma = (f0 - 1.0) / (2.0 * f0 - 1.0), 3.0 * (1.0 - kc) / (2.0 * kc - 1.0)
+    return max(math.atan(3.0 * (3.0 * a + gamma) / (3.0 + 2.0 * gamma)), 1e-3)  # the least psi that is computed
+
+
+@kernel(error_model="numpy")
 def prepare_lubliner(par):
     """Fill the derived slots: A and gamma, Y (2.74)-(2.75), Barcelona's alpha and beta, m and n, tan psi."""
     par[_A] = (par[_F0] - 1.0) / (2.0 * par[_F0] - 1.0)
     par[_GAMMA] = 3.0 * (1.0 - par[_KC]) / (2.0 * par[_KC] - 1.0)
+    par[_PSI] = min(par[_PSI], steepest_dilation(par[_KC], par[_F0]))
+    par[_PEAK] = max(par[_PEAK], par[_S0])
     par[_ALPHA], par[_BETA] = barcelona_coefficients(par[_S0], par[_PEAK], par[_EPEAK])
     par[_M] = compression_rate(par[_DC], par[_E], par[_S0], par[_XC])
     par[_N] = tension_rate(par[_DT], par[_E], par[_T0], par[_XT])
@@ -135,8 +152,8 @@ def _end(multiplier, t1, t2, t3, bulk, shear, kc, kt, par):
 
 @kernel(error_model="numpy")
 def _solve(t1, t2, t3, f0, bulk, shear, kc, kt, par):
-    """Multiplier with F = 0 where F(0) = f0 > 0: bracket by doubling, then false position with halving; -1 on
-    failure."""
+    """Multiplier with F = 0 where F(0) = f0 > 0: bracket by doubling, then false position with halving, then with
+    bisection in turn (F falls off a cliff where a nearly isotropic stress changes sign); -1 on failure."""
     scale = abs(t1) + abs(t2) + abs(t3)
     high = f0 / (3.0 * shear + bulk * par[_TAN])
     low, f_low, f_high = 0.0, f0, f0
@@ -150,9 +167,9 @@ def _solve(t1, t2, t3, f0, bulk, shear, kc, kt, par):
         return -1.0
     side = 0
     x = high
-    for _iteration in range(200):
+    for iteration in range(200):
         x = (low * f_high - high * f_low) / (f_high - f_low)
-        if not low < x < high:
+        if not low < x < high or (iteration > 12 and iteration % 2 == 0):
             x = 0.5 * (low + high)
         f = _end(x, t1, t2, t3, bulk, shear, kc, kt, par)[0]
         if abs(f) <= 1e-13 * scale or high - low <= 1e-16 * high:
@@ -252,9 +269,16 @@ def update_lubliner(deps, sig, state, par, length, tangent):
 
 
 def _check(values: Mapping[str, Any]) -> list[str]:
+    found = []
     if values["peak_yield"] < values["initial_yield"]:
-        return ["peak_yield at least initial_yield"]
-    return []
+        found.append("peak_yield at least initial_yield")
+    limit = steepest_dilation(values.get("stress_invariant_ratio", 2.0 / 3.0), values.get("biaxial_ratio", 1.16))
+    if values["dilation_angle"] > limit * (1.0 + 1e-9):
+        found.append(
+            f"dilation_angle at most {math.degrees(limit):.4g} deg with this stress_invariant_ratio and biaxial_ratio, "
+            "otherwise flow under pressure yields work"
+        )
+    return found
 
 
 LUBLINER = Law(

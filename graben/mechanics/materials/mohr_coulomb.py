@@ -50,6 +50,12 @@ _CHOICES = np.array(
 
 
 @kernel(error_model="numpy")
+def prepare_mohr_coulomb(par):
+    """No derived slots: the dilation angle stays at most the friction angle."""
+    par[_PSI] = min(par[_PSI], par[_PHI])
+
+
+@kernel(error_model="numpy")
 def _normal(plane, sine, out):
     """Gradient of a plane in principal axes: sin phi gives the yield function's, sin psi the potential's."""
     out[0] = out[1] = out[2] = 0.0
@@ -249,5 +255,6 @@ MOHR_COULOMB = Law(
     ),
     state_names=("equivalent_plastic_strain",),
     initial_state=lambda par: np.zeros(1),
+    prepare=prepare_mohr_coulomb,
     check=_check,
 )

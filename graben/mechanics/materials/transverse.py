@@ -30,7 +30,10 @@ _STIFFNESS = 6  # 36 slots, row by row, over (xx, yy, zz, xy, yz, zx) with engin
 @kernel(error_model="numpy")
 def prepare_transverse(par):
     """Fill the stiffness slots of par from the five constants and the angle."""
-    young, across, poisson, poisson_across, shear_across, angle = par[0], par[1], par[2], par[3], par[4], par[5]
+    young, across, poisson, shear_across, angle = par[0], par[1], par[2], par[4], par[5]
+    limit = math.sqrt(0.5 * (1.0 - 1e-6) * (1.0 - poisson) * across / young)
+    par[3] = min(max(par[3], -limit), limit)
+    poisson_across = par[3]
     ratio = young / across * poisson_across * poisson_across
     room = 1.0 - poisson - 2.0 * ratio
     local = np.zeros((6, 6))
@@ -81,7 +84,7 @@ def update_transverse(deps, sig, state, par, length, tangent):
 def _check(values: Mapping[str, Any]) -> list[str]:
     room = 1.0 - values["poisson_ratio"]
     taken = 2.0 * values["poisson_ratio_across"] ** 2 * values["young_modulus"] / values["young_modulus_across"]
-    if taken < room * (1.0 - 1e-9):
+    if taken < room * (1.0 - 1e-7):
         return []
     return [
         "poisson_ratio_across: 2 nu'^2 E / E' below 1 - nu, otherwise straining sets energy free "

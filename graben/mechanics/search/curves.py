@@ -215,6 +215,14 @@ class CurveFit:
         """Number of compared points of all curves."""
         return len(self._goal)
 
+    def used(self, values: Array) -> Array:
+        """What becomes of one candidate (k,): values that do not go together are moved as `Law.prepare` does, so
+        that `Law.check` accepts them. Same residuals, to the bit."""
+        par = self._base.copy()
+        par[self._slots] = values
+        prepare(self._id, par)
+        return np.asarray(par[self._slots], dtype=np.float64)
+
     def predict(self, values: Array) -> Predictions:
         """Responses of candidates `values` (c, k), parameter values in SI in the order of `free`."""
         values = np.ascontiguousarray(np.atleast_2d(values), dtype=np.float64)

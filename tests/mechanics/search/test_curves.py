@@ -155,3 +155,35 @@ def test_lateral_strain_counts_as_its_weight_says_on_every_curve():
     r = fit.residuals(np.array([[1e9]]))[0, : fit.points]
     costs = np.array([np.sum(r[fit.groups[: fit.points] == g] ** 2) for g in range(4)])
     np.testing.assert_allclose(costs, [0.0, 0.3**2 / 2, 0.0, 0.3**2 / 2], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "fixed", "asked"),
+    [
+        ("mohr-coulomb", {"cohesion": 1e6}, {"friction_angle": 0.5, "dilation_angle": 0.7}),
+        (
+            "drucker-prager",
+            {"hardening": "barcelona", "strain_at_peak": 0.01},
+            {"friction_angle": 0.8, "dilation_angle": 0.9, "initial_yield": 2e6, "peak_yield": 1e6},
+        ),
+        (
+            "lubliner",
+            {"tensile_yield": 1e5, "strain_at_peak": 0.01},
+            {"dilation_angle": 1.0, "stress_invariant_ratio": 0.9, "initial_yield": 2e6, "peak_yield": 1e6},
+        ),
+        (
+            "transverse-elastic",
+            {"shear_modulus_across": 1e9, "young_modulus_across": 1e9},
+            {"poisson_ratio_across": -0.9},
+        ),
+    ],
+)
+def test_values_that_do_not_go_together_become_the_nearest_that_do(law, fixed, asked):
+    """A search may ask for more dilation than friction; what it ends with is a material that other stages take."""
+    fixed = {"young_modulus": 2e9, "poisson_ratio": 0.2, **fixed}
+    assert LAWS[law].faults({**fixed, **asked})
+    fit = CurveFit(law, fixed, list(asked), synthetic(confinements=(1e6,)))
+    values = np.array(list(asked.values()))
+    used = fit.used(values)
+    assert LAWS[law].faults({**fixed, **dict(zip(asked, used))}) == []
+    np.testing.assert_array_equal(fit.residuals(used[None]), fit.residuals(values[None]))
