@@ -275,8 +275,8 @@ def _check(values: Mapping[str, Any]) -> list[str]:
     limit = steepest_dilation(values.get("stress_invariant_ratio", 2.0 / 3.0), values.get("biaxial_ratio", 1.16))
     if values["dilation_angle"] > limit * (1.0 + 1e-9):
         found.append(
-            f"dilation_angle at most {math.degrees(limit):.4g} deg with this stress_invariant_ratio and biaxial_ratio, "
-            "otherwise flow under pressure yields work"
+            f"dilation_angle at most {math.degrees(limit):.4g} deg with this stress_invariant_ratio and "
+            "biaxial_ratio, otherwise flow under pressure yields work"
         )
     return found
 

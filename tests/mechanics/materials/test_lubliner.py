@@ -148,7 +148,7 @@ def test_tangent_matches_finite_differences():
 
 
 def test_flow_steeper_than_the_flattest_meridian_would_make_work_under_pressure():
-    """Triaxial extension at 1000 times the yield stress, Kc = 1 and 2/3, with psi forced to 0.99 and 1.01 of its limit:
+    """Triaxial extension at 1000 times the yield stress, Kc = 1 and 2/3, psi forced to 0.99 and 1.01 of its limit:
     effective stress times plastic strain changes sign. What is stated beyond the limit is refused, what a search
     asks for is brought back to it."""
     for kc in (2 / 3, 1.0):
