@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from graben.mechanics.blocks import moving, search, zones
 from graben.mechanics.blocks import relaxation as rx
-from graben.mechanics.blocks import search, zones
 from graben.mechanics.blocks.bodies import Bodies, Skin, chamfered_skin
 from graben.mechanics.blocks.joints import (
     COLUMNS,
@@ -26,6 +26,7 @@ from graben.mechanics.blocks.joints import (
 )
 from graben.mechanics.blocks.memory import aligned
 from graben.mechanics.blocks.parts import cut_into_parts
+from graben.mechanics.blocks.team import run_together, share_out
 from graben.mechanics.failure import NumericsFailed
 
 
@@ -55,7 +56,7 @@ class BlockModel:
     gravity : (gx, gy) [m/s2], always with true masses.
     more_joints : sets 1, 2, ... beside `joint`, which is set 0; edge_set : (outline edges of the bodies,) set of each
     edge; set_between : (sets, sets) set that holds between edges of two sets, by default the lower of both.
-    threads : more than 1 shares the work out to numba's threads, with bitwise the same result.
+    threads : more than 1 shares the work out to as many threads, with bitwise the same result.
     """
 
     def __init__(
@@ -231,13 +232,15 @@ class BlockModel:
     def advance(self, steps: int) -> None:
         """Take `steps` time steps. Raises NumericsFailed when something runs away or blocks overlap too far."""
         left = steps
-        several = self.threads > 1 and len(self.parts.node) > 2
-        step, extra = (rx.advance_together, (self.threads,)) if several else (rx.advance, ())
+        threads = min(self.threads, len(self.parts.node) - 1)
+        sums = np.zeros((2, len(self.parts.node) - 1, moving.COLUMNS))
         while left > 0:
-            status, done, where = step(
+            m, s = self.motion, self.skeleton
+            rx.begin(s, m)
+            plan = share_out(self.parts, m.far_start, m.post_start, m.post, threads)
+            rest = (
                 left,
-                self.skeleton,
-                self.motion,
+                s,
                 self.parts,
                 self.pairs,
                 self.joint_table,
@@ -250,8 +253,9 @@ class BlockModel:
                 0.5 / self.dt,
                 self.damping.local,
                 self.most_energy,
-                *extra,
             )
+            own = [m] + [rx.private(m) for _ in range(1, threads)]
+            status, done, where = run_together(rx.advance, [(plan, sums, mine, *rest) for mine in own])
             left -= done
             self.steps_done += done
             self.time += done * self.dt

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 
 from graben.mechanics.blocks.joints import contact_forces, node_motion, scatter_nodes
@@ -17,13 +16,13 @@ from graben.mechanics.blocks.moving import (
     AT_OVERLAP,
     AT_PLASTIC,
     AT_WALL,
-    COLUMNS,
     move_blocks,
 )
 from graben.mechanics.blocks.search import follow_blocks, look_again
+from graben.mechanics.blocks.team import all_there, arrive
 from graben.mechanics.compiled import kernel
 
-DONE, REBUILD, RUNAWAY, DEEP_OVERLAP = 0, 1, 2, 3
+DONE, REBUILD, RUNAWAY, DEEP_OVERLAP, LEFT_ALONE = 0, 1, 2, 3, 4
 
 # Places in Motion.tally
 KINETIC, DAMPED, LOAD_WORK, WALL_WORK, RATE_SEEN, DAMPED_SEEN = range(6)
@@ -98,6 +97,11 @@ class Motion(NamedTuple):
     due: np.ndarray
 
 
+def private(m: Motion) -> Motion:
+    """The same motion for another thread: it decides for itself, from numbers of its own."""
+    return m._replace(tally=m.tally.copy(), sums=m.sums.copy(), drive=m.drive.copy(), due=m.due.copy())
+
+
 @kernel(error_model="numpy")
 def _press(p, s, m, parts, pairs, joints, deepest, dt, sums):
     """Contact forces of the pairs of part p."""
@@ -158,8 +162,8 @@ def _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums):
 
 
 @kernel(error_model="numpy")
-def _begin(s, m):
-    """Node table of the present positions; a look at all of them is due if somebody moved them since."""
+def begin(s, m):
+    """Before `advance`: node table of the present positions; a look at all is due if somebody moved them since."""
     x, v, node = m.x, m.v, m.node
     first, second, weight = s.first, s.second, s.weight
     for i in range(node.shape[0]):
@@ -239,78 +243,15 @@ def _next_drive(m):
     return load, speed, alpha
 
 
-@kernel(error_model="numpy")
+@kernel(error_model="numpy", nogil=True)
 def advance(
-    steps, s, m, parts, pairs, joints, dt, skin, near, dilation, deepest, damping_ratio, damping_limit, local, fastest
-):
-    """Up to `steps` steps of `dt` [s]. Returns (status, steps done, pair concerned).
-
-    s, m, parts : Skeleton, Motion, Parts; joints : table of sets of joints; dilation : largest tangent among them
-    skin, near : reach of the candidates and of the awake ones [m]; deepest : overlap limit [m]
-    damping_ratio : adaptive global damping holds its power at this ratio to the rate of kinetic energy; below 0
-    the damping coefficient in motion.drive stays as it is; damping_limit : its upper bound [1/s]
-    local : share of the unbalanced force taken off against the velocity
-    fastest : kinetic energy that stops the run [J/m]
-    """
-    count = parts.node.shape[0] - 1
-    sums = np.zeros((count, COLUMNS))
-    _begin(s, m)
-    for step in range(steps):
-        if m.due[0] <= 0:
-            for p in range(count):
-                follow_blocks(p, parts, m.node, near, m)
-            if not _worst(m.farthest[:, 0]) < (0.5 * skin) ** 2:
-                return REBUILD, step, -1
-            for p in range(count):
-                look_again(p, parts, pairs, s.follow, m.node, near, dilation, m)
-            m.due[0] = _next_look(m, near, dt)
-        m.due[0] -= 1
-        load, speed, alpha = _next_drive(m)
-        # A pair belongs to the lower of its parts: once all parts up to p are pressed, nobody reads the nodes of p.
-        for p in range(count):
-            _press(p, s, m, parts, pairs, joints, deepest, dt, sums)
-            _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums)
-        bad = _deep(sums)
-        if bad >= 0:
-            m.sums[LARGEST_OVERLAP] = sums[:, AT_OVERLAP].max()
-            return DEEP_OVERLAP, step, bad
-        if not _gather(m, sums, damping_ratio, damping_limit, alpha, dt) < fastest:
-            return RUNAWAY, step, -1
-    return DONE, steps, -1
-
-
-@kernel(error_model="numpy")
-def _share_out(m, count, shares):
-    """Parts of each share, and which parts push on another share: these are pressed before anything moves."""
-    share = np.empty(shares + 1, dtype=np.int64)
-    for k in range(shares + 1):
-        share[k] = (k * count) // shares
-    of = np.empty(count, dtype=np.int64)
-    for k in range(shares):
-        of[share[k] : share[k + 1]] = k
-    before = np.zeros(count, dtype=np.int64)
-    for q in range(count):
-        for k in range(m.post_start[q], m.post_start[q + 1]):
-            p = np.searchsorted(m.far_start, m.post[k, 0], side="right") - 1
-            if of[p] != of[q]:
-                before[p] = 1
-    return share, before
-
-
-@kernel(error_model="numpy")
-def _work_share(first, stop, before, s, m, parts, pairs, joints, deepest, dt, load, alpha, local, speed, sums):
-    """The parts of one share in order, as `advance` takes all parts."""
-    for p in range(first, stop):
-        if before[p] == 0:
-            _press(p, s, m, parts, pairs, joints, deepest, dt, sums)
-        _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums)
-
-
-@kernel(error_model="numpy", parallel=True)
-def advance_together(
+    me,
+    board,
+    plan,
+    sums,
+    m,
     steps,
     s,
-    m,
     parts,
     pairs,
     joints,
@@ -323,50 +264,64 @@ def advance_together(
     damping_limit,
     local,
     fastest,
-    threads,
 ):
-    """`advance` with parts shared out to threads: the same result, bit for bit."""
-    count = parts.node.shape[0] - 1
-    sums = np.zeros((count, COLUMNS))
-    shares = min(count, threads)
-    share, before = _share_out(m, count, shares)
-    _begin(s, m)
+    """Up to `steps` steps of `dt` [s] on the parts of thread `me`. Returns (status, steps done, pair concerned).
+
+    board, plan : as in team.py; sums : (2, parts, moving.COLUMNS) work space shared by all threads
+    m, s, parts : Motion, Skeleton, Parts; joints : table of sets of joints; dilation : largest tangent among them.
+    Threads share all arrays of m but tally, sums, drive and due: each takes the same decisions from its own.
+    skin, near : reach of the candidates and of the awake ones [m]; deepest : overlap limit [m]
+    damping_ratio : adaptive global damping holds its power at this ratio to the rate of kinetic energy; below 0
+    the damping coefficient in motion.drive stays as it is; damping_limit : its upper bound [1/s]
+    local : share of the unbalanced force taken off against the velocity
+    fastest : kinetic energy that stops the run [J/m]
+    """
+    first = plan.first[me]
+    stop = plan.first[me + 1]
+    pushes, pushed = plan.pushes, plan.pushed
+    turn = 0
     for step in range(steps):
         if m.due[0] <= 0:
-            for p in numba.prange(count):
+            for p in range(first, stop):
                 follow_blocks(p, parts, m.node, near, m)
+            turn += 1
+            arrive(board, me, turn)
+            if not all_there(board, turn):
+                return LEFT_ALONE, step, -1
             if not _worst(m.farthest[:, 0]) < (0.5 * skin) ** 2:
                 return REBUILD, step, -1
-            for p in numba.prange(count):
+            for p in range(first, stop):
                 look_again(p, parts, pairs, s.follow, m.node, near, dilation, m)
             m.due[0] = _next_look(m, near, dt)
         m.due[0] -= 1
         load, speed, alpha = _next_drive(m)
-        for k in numba.prange(count):
-            if before[k] == 1:
-                _press(k, s, m, parts, pairs, joints, deepest, dt, sums)
-        for k in numba.prange(shares):
-            _work_share(
-                share[k],
-                share[k + 1],
-                before,
-                s,
-                m,
-                parts,
-                pairs,
-                joints,
-                deepest,
-                dt,
-                load,
-                alpha,
-                local,
-                speed,
-                sums,
-            )
-        bad = _deep(sums)
+        # Others may still read the sums of the step before.
+        now = sums[step % 2]
+        for p in range(first, stop):
+            if pushes[p] == 1:
+                _press(p, s, m, parts, pairs, joints, deepest, dt, now)
+        turn += 1
+        arrive(board, me, turn)
+        # A pair belongs to the lower of its parts: once all parts up to p are pressed, nobody reads the nodes of p
+        # but other threads, and these only if they push on it.
+        for p in range(first, stop):
+            if pushes[p] == 0:
+                _press(p, s, m, parts, pairs, joints, deepest, dt, now)
+            if pushed[p] == 0:
+                _yield_to(p, s, m, parts, load, alpha, local, dt, speed, now)
+        if not all_there(board, turn):
+            return LEFT_ALONE, step, -1
+        for p in range(first, stop):
+            if pushed[p] == 1:
+                _yield_to(p, s, m, parts, load, alpha, local, dt, speed, now)
+        turn += 1
+        arrive(board, me, turn)
+        if not all_there(board, turn):
+            return LEFT_ALONE, step, -1
+        bad = _deep(now)
         if bad >= 0:
-            m.sums[LARGEST_OVERLAP] = sums[:, AT_OVERLAP].max()
+            m.sums[LARGEST_OVERLAP] = now[:, AT_OVERLAP].max()
             return DEEP_OVERLAP, step, bad
-        if not _gather(m, sums, damping_ratio, damping_limit, alpha, dt) < fastest:
+        if not _gather(m, now, damping_ratio, damping_limit, alpha, dt) < fastest:
             return RUNAWAY, step, -1
     return DONE, steps, -1
