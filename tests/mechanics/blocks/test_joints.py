@@ -152,7 +152,6 @@ def test_same_run_twice_is_bitwise_the_same():
     assert np.array_equal(one.pairs.shear, other.pairs.shear)
 
 
-@pytest.mark.verify  # compiles for half a minute
 def test_two_threads_give_bitwise_the_same():
     models = []
     for threads in (1, 2, 3):
