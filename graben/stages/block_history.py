@@ -79,8 +79,12 @@ def read_run(path: Path) -> Run:
             length=_floats(data, "contact_length"),
             slip=_floats(data, "contact_slip"),
             flag=_ints(data, "contact_state"),
+            tangent=_floats(data, "contact_tangent"),
+            moment=_floats(data, "contact_force_moment") if "contact_force_moment" in data else None,
         ),
         vertex_force=_floats(data, "boundary_force"),
+        body_force=_floats(data, "body_force") if "body_force" in data else None,
+        overlap_moment=_floats(data, "overlap_moment") if "overlap_moment" in data else None,
     )
     try:
         _ = history.network

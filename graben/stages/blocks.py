@@ -69,7 +69,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         test.begin(progress)
     else:
         _bring_back(blocks_checkpoint.path_for(output), model, test, parts)
-    history = History(model)
+    history = History(model, scene.output.balance)
     if parts is not None:
         history.bring_back(parts["history"])
     keeper = blocks_checkpoint.Keeper(output, scene)

@@ -52,7 +52,8 @@ class Biaxial:
             progress(k / (states - 1), f"state {k} of {states - 1}")
 
         speed, behind = -self.scene.loading.speed, len(history.time)
-        compress(self.model, speed, self.steps, states, saved, saved=behind, courses=self.courses)
+        loose = self.scene.numerics.stop_loose_blocks
+        compress(self.model, speed, self.steps, states, saved, saved=behind, courses=self.courses, stop_loose=loose)
 
     def state(self) -> dict[str, np.ndarray]:
         """What a checkpoint must hold beside the model."""
@@ -96,6 +97,7 @@ class Biaxial:
             "peak_wall_stress_pa": float(vertical[peak]),
             "strain_at_peak": self._strain(float(arrays["time"][peak]), size[1]),
             "steps": self.model.steps_done,
+            "loose_blocks": int(arrays["loose_blocks"].max()),
             "energy_error": energy_error(arrays),
             "kinetic_over_stored_energy": float(kinetic_share(arrays)[after].mean()),
             "lateral_over_applied_stress": float((lateral / applied)[after].mean()),
@@ -123,5 +125,6 @@ def energy_error(arrays: dict[str, np.ndarray]) -> float:
 
 
 def kinetic_share(arrays: dict[str, np.ndarray]) -> np.ndarray:
-    """Kinetic over stored energy per state."""
-    return arrays["energy_kinetic"] / (arrays["energy_strain"] + arrays["energy_joint"])
+    """Kinetic over stored energy per state; what flies loose counts in neither."""
+    moving = arrays["energy_kinetic"] - arrays["energy_kinetic_loose"]
+    return moving / (arrays["energy_strain"] + arrays["energy_joint"])

@@ -224,6 +224,11 @@ def curve_arrays(jobs: Sequence[tuple[Run, Rev]], averages: Sequence[Average]) -
     }
     for name in (*_TENSORS, *_SCALARS):
         arrays[name] = padded([getattr(a, name) for a in averages])
+    if any(a.balance_residual is not None for a in averages):
+        nothing = [np.full(n, np.nan) for n in steps]
+        arrays["balance_residual"] = padded(
+            [e if a.balance_residual is None else a.balance_residual for a, e in zip(averages, nothing)]
+        )
     return arrays
 
 

@@ -158,6 +158,7 @@ def test_a_body_that_does_not_stand_is_a_failure_of_the_run(scene):
         ('programme.loads=[{start=["5 m","4 m"],end=["6 m","4 m"]}]', "outline"),
         ('programme.supports=[{start=["5 m","4 m"],end=["6 m","4 m"]}]', "outline"),
         ("programme.supports=[]", "support"),
+        ("numerics.stop_loose_blocks=true", "stop_loose_blocks"),
         ('loading.speed="1 mm/s"', "either"),
         ('domain.outline=[["0 m","0 m"],["8 m","5 m"],["8 m","0 m"],["0 m","5 m"]]', "cross"),
     ],

@@ -9,7 +9,7 @@ import xarray
 from graben.mechanics.failure import NumericsFailed
 from graben.schemas.artifact import check_artifact, read_artifact
 from graben.schemas.faults import BadInput
-from graben.stages import dem_run, picture
+from graben.stages import dem_run, homogenize, picture
 
 SCENE = """
 kind = "blocks"
@@ -82,6 +82,52 @@ def test_averaged_stress_equals_boundary_forces(finished):
         by_zones = np.einsum("z,zc->c", _zone_area(d), d.zone_stress.values[k])
         assert by_forces[1, 1] == pytest.approx(by_zones[1], rel=0.05)
         assert by_forces[0, 0] == pytest.approx(by_zones[0], rel=0.05)
+
+
+def test_artifact_closes_the_balance_with_inertia(scene):
+    output, curves = scene.with_name("balance.nc"), scene.with_name("curves.nc")
+    settings = ["output.balance=true", "output.vtk=false", "numerics.steps=1500", "loading.states=4"]
+    dem_run.run(scene, output, overrides=settings)
+    homogenize.run([output], curves, radii=[0.7])
+    with xarray.open_dataset(curves) as c:
+        # Stress by zones and by forces: equal with inertia, some per cent apart without.
+        assert float(c.balance_residual.max()) < 1e-12
+        assert float(abs(c.stress - c.stress_boundary).max()) > 1e-3 * float(abs(c.stress).max())
+    with xarray.open_dataset(output) as d:
+        x = (d.vertex_position + d.displacement[-1]).values
+        force = (d.body_force[-1] + d.boundary_force[-1]).values
+        last = slice(int(d.contact_count[:-1].sum()), None)
+        push, at, along, bent = (
+            d[k].values[last]
+            for k in ("contact_force", "contact_position", "contact_tangent", "contact_force_moment")
+        )
+        block = d.contact_block.values[last]
+        own = d.vertex_block.values
+        total = np.zeros((d.sizes["block"], 3))
+        np.add.at(total, own, np.column_stack([force, _cross(x, force)]))
+        row = np.column_stack([push, _cross(at, push) + _cross(along, bent)])
+        np.add.at(total, block[:, 0], row)
+        np.add.at(total, block[:, 1], -row)
+        assert np.abs(total).max() < 1e-12 * np.abs(push).max()
+
+
+def _cross(a, b):
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def test_far_beyond_the_peak_with_loose_blocks(scene):
+    # 15 % strain at the steps a state of draft fidelity, smooth joints: blocks are pressed out and fly.
+    settings = ["output.vtk=false", "loading.states=31", "numerics.steps=9000", 'loading.speed="3 mm/s"']
+    runs = {}
+    for stop in ("false", "true"):
+        output = scene.with_name(f"loose-{stop}.nc")
+        headline = dem_run.run(scene, output, overrides=[*settings, f"numerics.stop_loose_blocks={stop}"])
+        runs[stop] = read_artifact(output, "blocks")
+        assert headline["energy_error"] < 0.05
+        assert headline["loose_blocks"] == int(runs[stop].loose_blocks.max()) > 0
+        assert np.isfinite(runs[stop].displacement.values).all()
+    assert runs["false"].energy_kinetic_loose.values.max() > 0.0
+    assert runs["true"].energy_kinetic_loose.values.max() == 0.0
 
 
 def test_vtk_opens_with_the_promised_fields(finished):

@@ -21,6 +21,7 @@ from graben.mechanics.averaging.strain import (
     zone_gradient,
 )
 from graben.mechanics.averaging.stress import (
+    balance_residual,
     block_motion,
     boundary_average,
     forces_on,
@@ -40,7 +41,8 @@ class Contacts:
 
     state : (contact,) saved state; block : (contact, 2); position : (contact, 2) m, current;
     force : (contact, 2) N/m on the first block; length, slip : (contact,) m; flag : (contact,) 0 sticks, 1 slips,
-    2 open, 3 broken
+    2 open, 3 broken; tangent : (contact, 2); moment : (contact, 2) N, first moment of the force along the tangent
+    about `position`. Without the last two the force acts at `position`
     """
 
     state: Ints
@@ -50,6 +52,24 @@ class Contacts:
     length: Floats
     slip: Floats
     flag: Ints
+    tangent: Floats | None = None
+    moment: Floats | None = None
+
+    def point_forces(self, chosen: NDArray[np.bool_]) -> tuple[Ints, Ints, Floats, Floats]:
+        """State, blocks, position and force of some contacts (contact,), each as one force at either end."""
+        state, block, position, force = (v[chosen] for v in (self.state, self.block, self.position, self.force))
+        if self.tangent is None or self.moment is None:
+            return state, block, position, force
+        length = self.length[chosen]
+        # The same force and first moment at any distance apart.
+        apart = np.where(length > 0.0, length, 1.0)[:, None]
+        half, more = 0.5 * apart * self.tangent[chosen], self.moment[chosen] / apart
+        return (
+            np.tile(state, 2),
+            np.tile(block, (2, 1)),
+            np.concatenate([position - half, position + half]),
+            np.concatenate([0.5 * force - more, 0.5 * force + more]),
+        )
 
 
 @dataclass(frozen=True)
@@ -59,7 +79,8 @@ class History:
     time : (time,) s; position : (vertex, 2) m at the first saved state; displacement : (time, vertex, 2) m since
     then; vertex_block : (vertex,); zone_vertex : (zone, 3); zone_block : (zone,); corner_count : (block,);
     corner : (sum,); zone_stress : (time, zone, 4) Pa, xx yy zz xy, tension positive; vertex_force :
-    (time, vertex, 2) N/m from walls and pressures
+    (time, vertex, 2) N/m from walls and pressures; body_force : (time, vertex, 2) N/m weight less inertia and
+    damping, and overlap_moment : (time, block, 4) N, where the run kept them
     """
 
     time: Floats
@@ -73,6 +94,8 @@ class History:
     zone_stress: Floats
     contacts: Contacts
     vertex_force: Floats
+    body_force: Floats | None = None
+    overlap_moment: Floats | None = None
 
     @cached_property
     def network(self) -> Network:
@@ -138,6 +161,7 @@ class Average:
     joint_slip_max: Floats
     coordination: Floats
     strain_closure: float
+    balance_residual: Floats | None
 
 
 def average(history: History, rev: Rev, deformed: bool = False, chosen_at: int = 0) -> Average:
@@ -173,7 +197,7 @@ def average(history: History, rev: Rev, deformed: bool = False, chosen_at: int =
     bare = outline.blocks & ~history.zoned
     if bare.any():
         moment = rigid.force_moment(
-            bare, history.motion[0], c.state, c.block, c.position, c.force,
+            bare, history.motion[0], *c.point_forces(bare[c.block].any(axis=1)),
             history.vertex_block, history.current, history.vertex_force,
         ) / np.broadcast_to(measure, (count,))[:, None, None]  # fmt: skip
         stress[:, 0] += moment[:, 0, 0]
@@ -193,18 +217,25 @@ def average(history: History, rev: Rev, deformed: bool = False, chosen_at: int =
 
     forces = forces_on(
         outline.blocks,
-        c.state,
-        c.block,
-        c.position,
-        c.force,
+        *c.point_forces(outline.blocks[c.block[:, 0]] != outline.blocks[c.block[:, 1]]),
         history.vertex_block,
         history.current,
         history.vertex_force,
     )
     origin = x.mean(axis=0)
+    own = outline.blocks[history.vertex_block]
     symmetric, resultant, skew = boundary_average(forces, count, measure, origin)
     stress_boundary = np.stack([symmetric[:, 0], symmetric[:, 1], stress[:, 2], symmetric[:, 2]], axis=1)
     moment = per_state(forces.state, forces.force[:, :, None] * (forces.position - origin)[:, None, :], count)
+    balance = None
+    if history.body_force is not None and history.overlap_moment is not None and not bare.any():
+        balance = balance_residual(
+            moment,
+            zone_average(history.zone_stress[:, within], current_areas, np.ones(count)),
+            history.body_force[:, own],
+            history.current[:, own] - origin,
+            history.overlap_moment[:, outline.blocks],
+        )
     work = hill_mandel(
         forces,
         history.time,
@@ -239,4 +270,5 @@ def average(history: History, rev: Rev, deformed: bool = False, chosen_at: int =
         joint_slip_max=joints.slip_max,
         coordination=joints.coordination,
         strain_closure=closure,
+        balance_residual=balance,
     )

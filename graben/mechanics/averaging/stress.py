@@ -128,6 +128,28 @@ def boundary_average(
     return stress, _ratio(np.hypot(*resultant.T), size), _ratio(skew, scale)
 
 
+def balance_residual(
+    outline_moment: Floats, zones: Floats, body_force: Floats, arm: Floats, overlap: Floats
+) -> Floats:
+    """How far stress by zones is from stress by forces, inertia accounted for: (time,) over the former's size.
+
+    Parameters
+    ----------
+    outline_moment : (time, 2, 2) N, sum of force (x) position over the forces on an outline
+    zones : (time, 4) N, sum of stress x area over the zones inside, at the same state
+    body_force, arm : (time, vertex, 2) N/m and m, of the vertices inside, about the same origin
+    overlap : (time, block, 4) N, of the blocks inside
+    """
+    total = outline_moment + np.einsum("tvi,tvj->tij", body_force, arm)
+    missing = overlap.sum(axis=1) - zones
+    total[:, 0, 0] += missing[:, 0]
+    total[:, 1, 1] += missing[:, 1]
+    total[:, 0, 1] += missing[:, 3]
+    total[:, 1, 0] += missing[:, 3]
+    size = np.sqrt(zones[:, 0] ** 2 + zones[:, 1] ** 2 + 2.0 * zones[:, 3] ** 2)
+    return _ratio(np.sqrt((total**2).sum(axis=(1, 2))), size)
+
+
 def _ratio(part: Floats, whole: Floats) -> Floats:
     return np.divide(part, whole, out=np.zeros_like(part), where=whole > 0.0)
 

@@ -15,6 +15,9 @@ from graben.mechanics.failure import NumericsFailed
 # Rest comes soonest with more damping than a moving wall should feel.
 _CONSOLIDATION_DAMPING = 1.0
 
+# Steps between two looks for loose blocks.
+_LOOSE_EVERY = 250
+
 
 @dataclass(frozen=True)
 class Sides:
@@ -111,12 +114,13 @@ def compress(
     ramp_share: float = 0.01,
     saved: int = 0,
     courses: Courses | None = None,
+    stop_loose: bool = False,
 ) -> None:
     """Move the top at `speed` [m/s, negative: down] for `steps` steps; call save(k, model) at `states` states.
 
     State 0 is the start. The speed rises over the first `ramp_share` of the steps. The pressure on the top is
-    dropped: the wall now carries it. saved : states that a model brought back from a snapshot has behind it.
-    courses : instead of speed and ramp
+    dropped: the wall now carries it. saved : states that a model brought back from a snapshot has behind it;
+    courses : instead of speed and ramp; stop_loose : stop loose blocks every 250 steps, see `BlockModel.calm_loose_blocks`
     """
     b = model.bodies
     top = b.vertex_side[:, rectangle_sides(b.outline).top]
@@ -134,6 +138,9 @@ def compress(
         done, end = (round(steps * j / (states - 1)) for j in (k - 1, k))
         while done < end:
             stop = end if courses is None else min(end, courses.drive(model, done))
+            stop = min(stop, done + _LOOSE_EVERY) if stop_loose else stop
             model.advance(stop - done)
             done = stop
+            if stop_loose:
+                model.calm_loose_blocks()
         save(k, model)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from graben.mechanics.blocks import relaxation as rx
+from graben.mechanics.blocks.balance import balance
 from graben.mechanics.blocks.model import BlockModel
 
 ENERGIES = ("kinetic", "strain", "joint", "friction", "damping", "boundary", "external", "error")
@@ -13,11 +14,12 @@ ENERGIES = ("kinetic", "strain", "joint", "friction", "damping", "boundary", "ex
 class History:
     """Collects states of a model; the first one is the reference for displacements.
 
-    model : the model; begin : time of the first state [s] is taken as 0
+    model : the model; balanced : keep what closes the balance of forces, too, see `balance`
     """
 
-    def __init__(self, model: BlockModel) -> None:
+    def __init__(self, model: BlockModel, balanced: bool = False) -> None:
         self.model = model
+        self.optional = ("body_force", "overlap_moment") if balanced else ()
         self.start_time = model.time
         self.reference = model.motion.x.copy()
         self.time: list[float] = []
@@ -33,6 +35,9 @@ class History:
                 "contact",
                 "contact_pair",
                 "contact_state",
+                "contact_set",
+                "loose",
+                *self.optional,
             )
         }
         self.overlap: list[float] = []
@@ -48,7 +53,8 @@ class History:
         rows = self.rows
         rows["displacement"].append(m.motion.x - self.reference)
         rows["velocity"].append(m.motion.v.copy())
-        rows["zone_stress"].append(m.zone_stress())
+        stress = m.zone_stress()
+        rows["zone_stress"].append(stress)
         rows["boundary_force"].append(force)
         rows["wall_reaction"].append(side_forces(force, b.vertex_side, b.outline))
         rows["energy"].append(np.array([energy[k] for k in ENERGIES]))
@@ -57,6 +63,12 @@ class History:
         ends = np.column_stack([m.pairs.first[pair], m.pairs.second[pair]])
         rows["contact_pair"].append(m.skin.block[ends])
         rows["contact_state"].append(ints[:, 1])
+        rows["contact_set"].append(m.pairs.joint[pair])
+        loose = m.loose_blocks()
+        rows["loose"].append(np.array([[np.count_nonzero(loose), m.kinetic_energy(loose)]]))
+        if self.optional:
+            for name, values in balance(m, stress, force)._asdict().items():
+                rows[name].append(values)
         self.overlap.append(float(m.motion.sums[rx.LARGEST_OVERLAP]))
         self.damping.append(float(m.motion.drive[rx.DAMPING]))
 
@@ -104,9 +116,15 @@ class History:
             "contact_slip": contact[:, 7],
             "contact_opening": contact[:, 8],
             "contact_tangent": contact[:, 9:11],
+            "contact_force_moment": contact[:, 11:13],
             "contact_state": np.concatenate(rows["contact_state"]),
+            "loose_blocks": np.vstack(rows["loose"])[:, 0].astype(np.int32),
+            "energy_kinetic_loose": np.vstack(rows["loose"])[:, 1],
         }
-        for name in ("displacement", "velocity", "zone_stress", "boundary_force", "wall_reaction"):
+        if len(self.model.joints) > 1:
+            result["contact_set"] = np.concatenate(rows["contact_set"])
+        whole = ("displacement", "velocity", "zone_stress", "boundary_force", "wall_reaction", *self.optional)
+        for name in whole:
             result[name] = np.array(rows[name])
         energy = np.array(rows["energy"])
         for k, name in enumerate(ENERGIES):

@@ -382,12 +382,22 @@ def contact_forces(
 
 
 @kernel(error_model="numpy")
-def contact_state(pairs, follow, node, table, deepest, out, ints):
+def _hand_to_nodes(fn, i, j, share, forcex, forcey, qx, qy):
+    """A force at a share of the edge from node i to node j, and a couple: q at i, -q at j."""
+    fn[i, 0] += (1.0 - share) * forcex + qx
+    fn[i, 1] += (1.0 - share) * forcey + qy
+    fn[j, 0] += share * forcex - qx
+    fn[j, 1] += share * forcey - qy
+
+
+@kernel(error_model="numpy")
+def contact_state(pairs, follow, node, table, deepest, out, ints, fn):
     """State of all touching candidates, for output. Returns (their number, stored joint energy [J/m]).
 
-    out : (n, 11) position x, y [m]; force on the first edge x, y [N/m]; mean normal (tension positive) and shear
-    stress [Pa]; length [m]; mean net slip [m]; mean opening [m]; unit tangent x, y.
-    ints : (n, 2) pair and state flag.
+    out : (n, 13) middle x, y [m]; force on the first edge x, y [N/m]; mean normal (tension positive) and shear
+    stress [Pa]; length [m]; mean net slip [m]; mean opening [m]; unit tangent x, y; first moment of the force along
+    the tangent about the middle x, y [N]: both ends carry their own force.
+    ints : (n, 2) pair and state flag; fn : (nodes, 2) the same forces on the contact nodes, added to [N/m].
     """
     count = 0
     stored = 0.0
@@ -423,18 +433,22 @@ def contact_state(pairs, follow, node, table, deepest, out, ints):
             area *= (facing - FACING_NONE) / (FACING_FULL - FACING_NONE)
         gap0 = h1 + (h0 - h1) * (low - s1) / (s0 - s1) - rise * low
         gap1 = h1 + (h0 - h1) * (high - s1) / (s0 - s1) - rise * high
+        gaps = 0.5 * (gap0 + gap1)
+        if -gaps > deepest:
+            continue
         area *= _bearing(high - low, gap0, gap1, rim) / (high - low)
         normal = 0.0
         shear = 0.0
-        gaps = 0.0
         height = 0.0
+        momentx = 0.0
+        momenty = 0.0
+        middle = 0.5 * (low + high)
         worst = STICK
         closed = 0
         for k in range(2):
             s = low if k == 0 else high
             front = h1 + (h0 - h1) * (s - s1) / (s0 - s1)
             gap = front - rise * s
-            gaps += 0.5 * gap
             height += 0.25 * (front + rise * s)
             flag = pairs.flag[c, k]
             if flag == OPEN:
@@ -449,14 +463,20 @@ def contact_state(pairs, follow, node, table, deepest, out, ints):
             closed += 1
             normal -= 0.5 * sigma
             shear += 0.5 * pairs.shear[c, k]
+            tau = pairs.shear[c, k]
+            forcex = (tau * tx - sigma * ty) * area
+            forcey = (tau * ty + sigma * tx) * area
+            momentx += forcex * (s - middle)
+            momenty += forcey * (s - middle)
+            couple = 0.5 * gap * tau * area
+            qe, qf = couple / se, couple / (s0 - s1)
+            _hand_to_nodes(fn, e, follow[e], s / se, forcex, forcey, qe * ty, -qe * tx)
+            _hand_to_nodes(fn, f, f2, (s0 - s) / (s0 - s1), -forcex, -forcey, -qf * ty, qf * tx)
             stored += area * (energy + 0.5 * pairs.shear[c, k] * pairs.shear[c, k] / table[j, 1])
             if flag == SLIP and worst == STICK:
                 worst = SLIP
             if flag == BROKEN:
                 worst = BROKEN
-        if -gaps > deepest:
-            continue
-        middle = 0.5 * (low + high)
         out[count, 0] = ox + middle * tx + height * ty
         out[count, 1] = oy + middle * ty - height * tx
         out[count, 2] = 2.0 * area * (shear * tx + normal * ty)
@@ -468,6 +488,8 @@ def contact_state(pairs, follow, node, table, deepest, out, ints):
         out[count, 8] = gaps
         out[count, 9] = tx
         out[count, 10] = ty
+        out[count, 11] = momentx
+        out[count, 12] = momenty
         ints[count, 0] = c
         ints[count, 1] = worst if closed > 0 else OPEN
         count += 1

@@ -12,7 +12,6 @@ from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.bodies import Bodies, Skin, chamfered_skin
 from graben.mechanics.blocks.joints import (
     COLUMNS,
-    OPEN,
     RIM,
     RIM_SHARE,
     STICK,
@@ -324,34 +323,37 @@ class BlockModel:
 
     def unbalanced_ratio(self) -> float:
         """Largest unbalanced force on a free vertex over the mean size of zone forces."""
+        scale = float(np.abs(self.motion.zone_force).mean())
+        return float(np.abs(self.unbalanced_force()).max()) / scale if scale > 0.0 else np.inf
+
+    def unbalanced_force(self) -> np.ndarray:
+        """What is left of the forces (vertices, 2) on free vertices [N/m]; of loose blocks nothing, they fly."""
         s, m = self.skeleton, self.motion
         load = s.steady + m.drive[rx.LOAD] * s.rising
-        total = np.where(self.held, 0.0, m.zone_force + m.joint_force + load)
-        scale = float(np.abs(m.zone_force).mean())
-        return float(np.abs(total).max()) / scale if scale > 0.0 else np.inf
+        out = self.held | self.loose_blocks()[self.bodies.vertex_block, None]
+        return np.where(out, 0.0, m.zone_force + m.joint_force + load)
 
     def zone_stress(self) -> np.ndarray:
         """Cauchy stress (zones, 4) as xx, yy, zz, xy [Pa]."""
         return zones.zone_state(self.motion.x, *self.skeleton.zones)[0]
 
-    def contacts(self) -> tuple[np.ndarray, np.ndarray, float]:
-        """Touching pairs: out (n, 11) and ints (n, 2) as in `joints.contact_state`, and the stored energy [J/m]."""
+    def contacts(self, nodal: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, float]:
+        """Touching pairs: out (n, 13) and ints (n, 2) as in `joints.contact_state`, and the stored energy [J/m].
+
+        nodal : (contact nodes, 2), their forces, added to [N/m]
+        """
         s, m = self.skeleton, self.motion
         node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.node, 0, len(m.node))
         n = len(self.pairs.key)
-        out, ints = np.zeros((n, 11)), np.zeros((n, 2), dtype=np.int64)
-        count, stored = contact_state(self.pairs, s.follow, m.node, self.joint_table, self.deepest, out, ints)
+        out, ints = np.zeros((n, 13)), np.zeros((n, 2), dtype=np.int64)
+        fn = np.zeros((len(m.node), 2)) if nodal is None else nodal
+        count, stored = contact_state(self.pairs, s.follow, m.node, self.joint_table, self.deepest, out, ints, fn)
         return out[:count], ints[:count], stored
 
     def loose_blocks(self) -> np.ndarray:
-        """Mask (blocks,) of those that touch no other block and are held by nothing."""
-        _, ints, _ = self.contacts()
-        pair = ints[ints[:, 1] != OPEN, 0]
-        fixed = np.zeros(len(self.bodies.block_area), dtype=bool)
-        fixed[self.skin.block[self.pairs.first[pair]]] = True
-        fixed[self.skin.block[self.pairs.second[pair]]] = True
-        fixed[self.bodies.vertex_block[self.held.any(axis=1)]] = True
-        return ~fixed
+        """Mask (blocks,) of those on which, in the last step, no other block pushed, and that nothing holds."""
+        pushed = self.held.any(axis=1) | self.motion.joint_force.any(axis=1)
+        return np.bincount(self.bodies.vertex_block[pushed], minlength=len(self.bodies.block_area)) == 0
 
     def kinetic_energy(self, blocks: np.ndarray) -> float:
         """Kinetic energy [J/m] of the blocks of a mask (blocks,); for instance of all that are not loose."""

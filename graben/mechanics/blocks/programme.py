@@ -69,13 +69,10 @@ def pressure_forces(bodies: Bodies, start: np.ndarray, end: np.ndarray) -> np.nd
 def imbalance(model: BlockModel) -> float:
     """Mean size of unbalanced forces on free vertices over the mean size of zone forces.
 
-    Unlike the largest unbalanced force it does not hang on one loose block.
+    Unlike the largest unbalanced force it does not hang on one small block.
     """
-    s, m = model.skeleton, model.motion
-    load = s.steady + m.drive[rx.LOAD] * s.rising
-    total = np.where(model.held, 0.0, m.zone_force + m.joint_force + load)
-    scale = float(np.hypot(*m.zone_force.T).mean())
-    return float(np.hypot(*total.T).mean()) / scale if scale > 0.0 else np.inf
+    scale = float(np.hypot(*model.motion.zone_force.T).mean())
+    return float(np.hypot(*model.unbalanced_force().T).mean()) / scale if scale > 0.0 else np.inf
 
 
 def come_to_rest(

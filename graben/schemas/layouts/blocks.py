@@ -61,6 +61,15 @@ LAYOUT = Layout(
         "contact_position": Variable(("contact", "axis"), "m", "middle of the contact"),
         "contact_tangent": Variable(("contact", "axis"), "1", "unit vector along the contact"),
         "contact_force": Variable(("contact", "axis"), "N m-1", "force on the first block, per thickness"),
+        "contact_force_moment": Variable(
+            ("contact", "axis"),
+            "N",
+            "first moment of the force along the tangent about the middle: both ends carry their own force",
+            optional=True,
+        ),
+        "contact_set": Variable(
+            _C, "1", "set of joints of the contact; 0: those of [joints] itself", dtype="i2", optional=True
+        ),
         "contact_normal_stress": Variable(_C, "Pa", "mean normal stress, tension positive"),
         "contact_shear_stress": Variable(_C, "Pa", "mean shear stress on the first block, along the tangent"),
         "contact_length": Variable(_C, "m", "length over which the edges face each other"),
@@ -73,7 +82,25 @@ LAYOUT = Layout(
             dtype="i1",
             attributes={"flag_values": [0, 1, 2, 3], "flag_meanings": "stick slip open broken"},
         ),
+        "loose_blocks": Variable(
+            _T, "1", "blocks on which no other pushes and that nothing holds", dtype="i4", optional=True
+        ),
+        "body_force": Variable(
+            ("time", "vertex", "axis"),
+            "N m-1",
+            "weight less inertia and damping on the vertex: with zones, contacts and boundary_force it adds up to 0",
+            optional=True,
+        ),
+        "overlap_moment": Variable(
+            ("time", "block", "component"),
+            "N",
+            "force (x) distance from the middle of the block's contacts to its edges, which bear",
+            optional=True,
+        ),
         "energy_kinetic": _energy("kinetic energy (of the scaled masses)"),
+        "energy_kinetic_loose": Variable(
+            _T, "J m-1", "part of the kinetic energy that loose blocks have", optional=True
+        ),
         "energy_strain": _energy("strain energy of the zones"),
         "energy_joint": _energy("energy stored in the joints"),
         "energy_friction": _energy("energy taken by sliding since the first state"),

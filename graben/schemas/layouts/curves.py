@@ -55,6 +55,9 @@ LAYOUT = Layout(
         ),
         "force_imbalance": _step("1", "resultant of the forces on the outline over the sum of their sizes"),
         "moment_imbalance": _step("1", "antisymmetric part of the boundary-force stress over its size"),
+        "balance_residual": _step(
+            "1", "stress by zones less stress by forces with inertia, weight and overlap, over the former"
+        ),
         "hill_mandel_residual": _step("1", "(power of boundary forces - stress : strain rate) over its largest size"),
         "hill_mandel_work": _step("1", "accumulated Hill-Mandel residual over accumulated stress work"),
         "strain_blocks": Variable(

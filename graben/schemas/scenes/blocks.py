@@ -108,6 +108,11 @@ class Joints(Model):
 class Output(Model):
     """What is written beside the artifact."""
 
+    balance: bool = key(
+        False,
+        "also body_force and overlap_moment, with which homogenize closes the balance of stress by zones and by "
+        "forces to round-off",
+    )
     vtk: bool = key(True, "VTU files with a PVD for ParaView: zones and, in NAME-joints, contacts")
 
 
@@ -140,6 +145,8 @@ class BlocksScene(Scene):
             faults.append(f"tessellation.rounding of at most a quarter of the edge (found {t.rounding:.4g} m)")
         if t.shortest_edge is not None and t.shortest_edge > t.edge:
             faults.append(f"tessellation.shortest_edge below the edge (found {t.shortest_edge:.4g} m)")
+        if self.programme is not None and self.numerics.stop_loose_blocks:
+            faults.append("[loading] with numerics.stop_loose_blocks (under weight loose blocks fall)")
         strain = self.loading.largest_travel / d.height
         if self.programme is not None and "loading" in self.model_fields_set:
             faults.append("either [loading] or [programme]")

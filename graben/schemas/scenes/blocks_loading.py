@@ -175,6 +175,10 @@ class Numerics(Model):
     )
     consolidation_tolerance: float = key(1e-3, "unbalanced over mean zone force that ends consolidation", gt=0)
     energy_limit: float = key(0.05, "largest error of the energy ledger over the work done", gt=0)
+    stop_loose_blocks: bool = key(
+        False,
+        "[loading]: blocks that no other touches are stopped every 250 steps; without weight they would fly for ever",
+    )
     threads: int = key(
         1, "threads that share a run out, with bitwise the same result; pays from 2000 blocks on", ge=1
     )

@@ -52,8 +52,8 @@ class Bench:
         return force[:2, 1].sum(), force[:2, 0].sum()
 
     def stored(self):
-        out, ints = np.zeros((1, 11)), np.zeros((1, 2), dtype=np.int64)
-        return joints.contact_state(self.pairs, FOLLOW, self.node, self.table, 1.0, out, ints)[1], ints[0, 1]
+        out, ints, fn = np.zeros((1, 13)), np.zeros((1, 2), dtype=np.int64), np.zeros((4, 2))
+        return joints.contact_state(self.pairs, FOLLOW, self.node, self.table, 1.0, out, ints, fn)[1], ints[0, 1]
 
 
 def test_cohesion_is_lost_for_good_when_slip_breaks_a_joint():
