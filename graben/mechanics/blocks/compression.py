@@ -120,7 +120,8 @@ def compress(
 
     State 0 is the start. The speed rises over the first `ramp_share` of the steps. The pressure on the top is
     dropped: the wall now carries it. saved : states that a model brought back from a snapshot has behind it;
-    courses : instead of speed and ramp; stop_loose : stop loose blocks every 250 steps, see `BlockModel.calm_loose_blocks`
+    courses : instead of speed and ramp; stop_loose : stop loose blocks every 250 steps, see
+    `BlockModel.calm_loose_blocks`
     """
     b = model.bodies
     top = b.vertex_side[:, rectangle_sides(b.outline).top]
