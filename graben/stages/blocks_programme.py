@@ -67,8 +67,7 @@ class Rising:
         """Raise the pressures from the last saved state to failure or to the end."""
         m, p, rise = self.model, self.programme, self.rise
         if not history.time:
-            m.motion.tally[:] = 0.0
-            m.motion.sums[rx.FRICTION] = 0.0
+            m.begin_ledger()
             self._save(save)
         if not self.loads.direction.any():
             return

@@ -126,8 +126,7 @@ def compress(
     b = model.bodies
     top = b.vertex_side[:, rectangle_sides(b.outline).top]
     if saved == 0:
-        model.motion.tally[:] = 0.0
-        model.motion.sums[rx.FRICTION] = 0.0
+        model.begin_ledger()
         save(0, model)
         saved = 1
     if saved == 1:

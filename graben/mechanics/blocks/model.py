@@ -25,6 +25,7 @@ from graben.mechanics.blocks.joints import (
 )
 from graben.mechanics.blocks.memory import aligned
 from graben.mechanics.blocks.parts import cut_into_parts
+from graben.mechanics.blocks.plastic_zones import LOST, PlasticZones, Strength, plastic_zones
 from graben.mechanics.blocks.team import run_together, share_out
 from graben.mechanics.failure import NumericsFailed
 
@@ -47,7 +48,7 @@ SAFETY = 0.9
 
 
 class BlockModel:
-    """Elastic blocks with Coulomb joints.
+    """Deformable blocks with Coulomb joints.
 
     Parameters: bodies; young [Pa], poisson, density [kg/m3]; joint; rounding [m] of corners.
     dt : time step [s]. Given, masses follow from stiffness so that this step is stable everywhere (density scaling,
@@ -55,6 +56,7 @@ class BlockModel:
     gravity : (gx, gy) [m/s2], always with true masses.
     more_joints : sets 1, 2, ... beside `joint`, which is set 0; edge_set : (outline edges of the bodies,) set of each
     edge; set_between : (sets, sets) set that holds between edges of two sets, by default the lower of both.
+    strength : at which zones yield; None: elastic
     threads : more than 1 shares the work out to as many threads, with bitwise the same result.
     """
 
@@ -75,6 +77,7 @@ class BlockModel:
         more_joints: Sequence[Joint] = (),
         edge_set: np.ndarray | None = None,
         set_between: np.ndarray | None = None,
+        strength: Strength | None = None,
     ) -> None:
         kn = min(j.normal_stiffness for j in (joint, *more_joints))
         for name, value in (("young", young), ("density", density), ("kn", kn)):
@@ -117,8 +120,9 @@ class BlockModel:
         self.held = np.zeros((nv, 2), dtype=bool)
         self.weight = self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :]
         self.mass_ratio = mass / self.true_mass
+        elastic = zones.ElasticZones(bodies.zone_vertex.astype(np.int32), gradient, area, lam_z, mu_z)
         self.skeleton = rx.Skeleton(
-            zones.ElasticZones(bodies.zone_vertex.astype(np.int32), gradient, area, lam_z, mu_z),
+            elastic if strength is None else plastic_zones(elastic, young, poisson, strength),
             self.skin.first.astype(np.int32),
             self.skin.second.astype(np.int32),
             self.skin.weight,
@@ -258,6 +262,7 @@ class BlockModel:
             left -= done
             self.steps_done += done
             self.time += done * self.dt
+            self._refuse_lost_zones()
             if status == rx.REBUILD:
                 if done == 0 and self._stuck():
                     raise NumericsFailed("a position is not finite", step=self.steps_done, advice=_SLOWER)
@@ -279,6 +284,14 @@ class BlockModel:
                     step=self.steps_done,
                     advice="raise the normal stiffness of the joints or take more steps",
                 )
+
+    def _refuse_lost_zones(self) -> None:
+        z = self.skeleton.zones
+        if isinstance(z, PlasticZones) and (z.flag == LOST).any():
+            block = self.bodies.zone_block[int(np.argmax(z.flag == LOST))]
+            raise NumericsFailed(
+                "no stress within the strength of a zone", where=f"block {block}", step=self.steps_done, advice=_SLOWER
+            )
 
     def _stuck(self) -> bool:
         return not bool(np.all(np.isfinite(self.motion.x)))
@@ -335,7 +348,12 @@ class BlockModel:
 
     def zone_stress(self) -> np.ndarray:
         """Cauchy stress (zones, 4) as xx, yy, zz, xy [Pa]."""
-        return zones.zone_state(self.motion.x, *self.skeleton.zones)[0]
+        return self._zone_state()[0]
+
+    def _zone_state(self) -> tuple[np.ndarray, float]:
+        z = self.skeleton.zones
+        plastic = z.plastic if isinstance(z, PlasticZones) else None
+        return zones.zone_state(self.motion.x, z.triangles, z.gradient, z.area, z.lam, z.mu, plastic)
 
     def contacts(self, nodal: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, float]:
         """Touching pairs: out (n, 13) and ints (n, 2) as in `joints.contact_state`, and the stored energy [J/m].
@@ -375,20 +393,24 @@ class BlockModel:
     def energies(self) -> dict[str, float]:
         """Energy ledger [J per m of thickness]; error = work put in - everything accounted for."""
         m, t = self.motion, self.motion.tally
-        _, strain = zones.zone_state(m.x, *self.skeleton.zones)
         e = {
             "kinetic": float(t[rx.KINETIC]),
-            "strain": strain,
+            "strain": self._zone_state()[1],
             "joint": self.contacts()[2],
             "friction": float(m.sums[rx.FRICTION]),
+            "plastic": float(m.sums[rx.PLASTIC]),
             "damping": float(t[rx.DAMPED]),
             "boundary": float(t[rx.WALL_WORK]),
             "external": float(t[rx.LOAD_WORK]),
         }
-        e["error"] = (
-            e["boundary"] + e["external"] - e["kinetic"] - e["strain"] - e["joint"] - e["friction"] - e["damping"]
-        )
+        gone = ("kinetic", "strain", "joint", "friction", "plastic", "damping")
+        e["error"] = e["boundary"] + e["external"] - sum(e[name] for name in gone)
         return e
+
+    def begin_ledger(self) -> None:
+        """From now on work and losses count from nothing."""
+        self.motion.tally[:] = 0.0
+        self.motion.sums[[rx.FRICTION, rx.PLASTIC]] = 0.0
 
 
 _SLOWER = "take more steps (slower loading or a smaller time step) or look at that block's shape"

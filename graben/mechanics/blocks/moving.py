@@ -9,6 +9,7 @@ from typing import Any
 
 from numba.extending import overload
 
+from graben.mechanics.blocks.plastic_zones import PlasticZones, plastic_zone_forces
 from graben.mechanics.blocks.zones import ElasticZones, zone_forces
 from graben.mechanics.compiled import kernel
 
@@ -108,7 +109,17 @@ def _move_elastic(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):
     move_vertices(p, s, m, parts, load, alpha, local, dt, speed, sums)
 
 
-_LAWS = {ElasticZones: _move_elastic}
+@kernel(error_model="numpy")
+def _move_plastic(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):
+    force = m.zone_force
+    for i in range(parts.vertex[p], parts.vertex[p + 1]):
+        for d in range(2):
+            force[i, d] = 0.0
+    sums[p, AT_PLASTIC] = plastic_zone_forces(m.x, zones, force, parts.zone[p], parts.zone[p + 1])
+    move_vertices(p, s, m, parts, load, alpha, local, dt, speed, sums)
+
+
+_LAWS = {ElasticZones: _move_elastic, PlasticZones: _move_plastic}
 
 
 def move_blocks(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):

@@ -103,16 +103,23 @@ def zone_forces(x, triangles, gradient, area, lam, mu, force, begin, end):
         force[c, 1] += fay + fby
 
 
-def zone_state(x: np.ndarray, triangles, gradient, area, lam, mu):
-    """Cauchy stress (zones, 4) as xx, yy, zz, xy [Pa], and the strain energy of all zones [J/m]."""
+def zone_state(x: np.ndarray, triangles, gradient, area, lam, mu, plastic: np.ndarray | None = None):
+    """Cauchy stress (zones, 4) as xx, yy, zz, xy [Pa], and the strain energy of all zones [J/m].
+
+    plastic : (zones, 4 or more) plastic strain xx, yy, zz and gamma xy, taken off Green's strain
+    """
     f = np.einsum("zia,zib->zab", x[triangles], gradient)
-    strain = 0.5 * (np.einsum("zka,zkb->zab", f, f) - np.eye(2))
-    trace = strain[:, 0, 0] + strain[:, 1, 1]
+    strain = np.zeros((len(area), 3, 3))
+    strain[:, :2, :2] = 0.5 * (np.einsum("zka,zkb->zab", f, f) - np.eye(2))
+    if plastic is not None:
+        for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2))):
+            strain[:, i, j] -= plastic[:, k]
+        strain[:, 0, 1] -= 0.5 * plastic[:, 3]
+        strain[:, 1, 0] -= 0.5 * plastic[:, 3]
     s = 2.0 * mu[:, None, None] * strain
-    s[:, 0, 0] += lam * trace
-    s[:, 1, 1] += lam * trace
+    s[:, [0, 1, 2], [0, 1, 2]] += (lam * np.trace(strain, axis1=1, axis2=2))[:, None]
     energy = 0.5 * np.einsum("z,zab,zab->", area, s, strain)
     determinant = f[:, 0, 0] * f[:, 1, 1] - f[:, 0, 1] * f[:, 1, 0]
-    cauchy = np.einsum("zab,zbc,zdc->zad", f, s, f) / determinant[:, None, None]
-    out = np.column_stack([cauchy[:, 0, 0], cauchy[:, 1, 1], lam * trace / determinant, cauchy[:, 0, 1]])
+    cauchy = np.einsum("zab,zbc,zdc->zad", f, s[:, :2, :2], f) / determinant[:, None, None]
+    out = np.column_stack([cauchy[:, 0, 0], cauchy[:, 1, 1], s[:, 2, 2] / determinant, cauchy[:, 0, 1]])
     return out, float(energy)
