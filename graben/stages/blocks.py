@@ -14,6 +14,7 @@ from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets
 from graben.mechanics.blocks.joints import Joint
 from graben.mechanics.blocks.mending import mend
 from graben.mechanics.blocks.model import BlockModel, Damping
+from graben.mechanics.blocks.plastic_zones import Strength
 from graben.mechanics.blocks.tessellation import Tessellation, voronoi_blocks, without
 from graben.mechanics.failure import NumericsFailed
 from graben.schemas.artifact import write_artifact
@@ -160,6 +161,7 @@ def _model(scene: BlocksScene, tessellation: Tessellation, dt: float, gravity: t
         gravity=gravity,
         damping=_damping(scene, dt),
         threads=scene.numerics.threads,
+        strength=Strength(*scene.rock.strength) if scene.rock.zones == "mohr-coulomb" else None,
     )
 
 

@@ -8,6 +8,9 @@ import numpy as np
 
 from graben.schemas.vtk import VtuSeries
 
+# Of zones that can yield; in the files without "zone_".
+YIELD = ("zone_plastic_strain", "zone_state")
+
 
 def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
     """Zones in NAME.pvd, contacts as lines in NAME-joints.pvd, one VTU a state each."""
@@ -35,6 +38,7 @@ def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
                     "stress_major_compressive": centre - radius,
                     "stress_minor_compressive": centre + radius,
                     "block": arrays["zone_block"],
+                    **{name[5:]: arrays[name][k] for name in YIELD if name in arrays},
                 },
             )
             part = slice(end[k], end[k + 1])

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from graben.mechanics.blocks import programme as mechanics
-from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.courses import Course
 from graben.mechanics.blocks.history import History
 from graben.mechanics.blocks.loads import Loads

@@ -171,6 +171,24 @@ def test_options_of_joints_reach_the_model(scene, finished, setting, stronger):
     assert (run["peak_wall_stress_pa"] < finished[1]["peak_wall_stress_pa"]) == stronger
 
 
+def test_weak_rock_yields(scene, finished):
+    import pyvista
+
+    output = scene.with_name("weak.nc")
+    settings = ["states=3", 'zones="mohr-coulomb"', 'cohesion="2 MPa"', 'tension="0.5 MPa"', 'dilation="5 deg"']
+    tables = ["loading", *["rock"] * 4]
+    run = dem_run.run(scene, output, overrides=[f"{t}.{s}" for t, s in zip(tables, settings, strict=True)])
+    assert finished[1]["peak_wall_stress_pa"] < run["peak_wall_stress_pa"] < -0.5e6
+    d = read_artifact(output, "blocks")
+    yielded = d.zone_state.values[-1] > 0
+    assert yielded.sum() > 0
+    assert np.array_equal(d.zone_plastic_strain.values[-1] > 0.0, yielded)
+    assert float(d.energy_plastic[-1]) > 0.0
+    grid = pyvista.get_reader(output.with_name("weak.pvd"))
+    grid.set_active_time_value(grid.time_values[-1])
+    assert {"plastic_strain", "state"} <= set(grid.read()[0].cell_data)
+
+
 def test_threads_change_nothing(scene, finished):
     output = scene.with_name("threads.nc")
     dem_run.run(scene, output, overrides=["output.vtk=false", "numerics.threads=2"])
@@ -202,6 +220,8 @@ def test_failed_run_keeps_its_last_states(scene):
         ('tessellation.rounding="0.3 m"', "tessellation.rounding"),
         ('loading.speed="1 m/s"', "one half"),
         ("loading.sped=1", "loading.sped"),
+        ('rock.zones="plastic"', "rock.zones"),
+        ('rock.cohesion="1 MPa"', "cohesion"),
     ],
 )
 def test_bad_scenes_are_refused(scene, setting, key):

@@ -8,7 +8,7 @@ from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.balance import balance
 from graben.mechanics.blocks.model import BlockModel
 
-ENERGIES = ("kinetic", "strain", "joint", "friction", "damping", "boundary", "external", "error")
+ENERGIES = ("kinetic", "strain", "joint", "friction", "plastic", "damping", "boundary", "external", "error")
 
 
 class History:
@@ -28,7 +28,7 @@ class History:
             for name in (
                 "displacement",
                 "velocity",
-                "zone_stress",
+                *model.state_of_blocks(),
                 "boundary_force",
                 "wall_reaction",
                 "energy",
@@ -53,8 +53,8 @@ class History:
         rows = self.rows
         rows["displacement"].append(m.motion.x - self.reference)
         rows["velocity"].append(m.motion.v.copy())
-        stress = m.zone_stress()
-        rows["zone_stress"].append(stress)
+        for name, value in m.state_of_blocks().items():
+            rows[name].append(value)
         rows["boundary_force"].append(force)
         rows["wall_reaction"].append(side_forces(force, b.vertex_side, b.outline))
         rows["energy"].append(np.array([energy[k] for k in ENERGIES]))
@@ -67,7 +67,7 @@ class History:
         loose = m.loose_blocks()
         rows["loose"].append(np.array([[np.count_nonzero(loose), m.kinetic_energy(loose)]]))
         if self.optional:
-            for name, values in balance(m, stress, force)._asdict().items():
+            for name, values in balance(m, rows["zone_stress"][-1], force)._asdict().items():
                 rows[name].append(values)
         self.overlap.append(float(m.motion.sums[rx.LARGEST_OVERLAP]))
         self.damping.append(float(m.motion.drive[rx.DAMPING]))
@@ -123,12 +123,14 @@ class History:
         }
         if len(self.model.joints) > 1:
             result["contact_set"] = np.concatenate(rows["contact_set"])
-        whole = ("displacement", "velocity", "zone_stress", "boundary_force", "wall_reaction", *self.optional)
-        for name in whole:
+        whole = (*self.model.state_of_blocks(), "boundary_force", "wall_reaction", *self.optional)
+        for name in ("displacement", "velocity", *whole):
             result[name] = np.array(rows[name])
         energy = np.array(rows["energy"])
         for k, name in enumerate(ENERGIES):
-            result["energy_" + name] = energy[:, k]
+            # Zones that cannot yield take nothing.
+            if name != "plastic" or "zone_state" in rows:
+                result["energy_" + name] = energy[:, k]
         return result
 
 

@@ -25,7 +25,7 @@ from graben.mechanics.blocks.joints import (
 )
 from graben.mechanics.blocks.memory import aligned
 from graben.mechanics.blocks.parts import cut_into_parts
-from graben.mechanics.blocks.plastic_zones import LOST, PlasticZones, Strength, plastic_zones
+from graben.mechanics.blocks.plastic_zones import EQUIVALENT, LOST, PlasticZones, Strength, plastic_zones
 from graben.mechanics.blocks.team import run_together, share_out
 from graben.mechanics.failure import NumericsFailed
 
@@ -290,7 +290,10 @@ class BlockModel:
         if isinstance(z, PlasticZones) and (z.flag == LOST).any():
             block = self.bodies.zone_block[int(np.argmax(z.flag == LOST))]
             raise NumericsFailed(
-                "no stress within the strength of a zone", where=f"block {block}", step=self.steps_done, advice=_SLOWER
+                "no stress within the strength of a zone",
+                where=f"block {block}",
+                step=self.steps_done,
+                advice=_SLOWER,
             )
 
     def _stuck(self) -> bool:
@@ -349,6 +352,14 @@ class BlockModel:
     def zone_stress(self) -> np.ndarray:
         """Cauchy stress (zones, 4) as xx, yy, zz, xy [Pa]."""
         return self._zone_state()[0]
+
+    def state_of_blocks(self) -> dict[str, np.ndarray]:
+        """What the law of the zones leaves at each state, named as in the artifact."""
+        z = self.skeleton.zones
+        state = {"zone_stress": self.zone_stress()}
+        if isinstance(z, PlasticZones):
+            state |= {"zone_plastic_strain": z.plastic[:, EQUIVALENT].copy(), "zone_state": z.flag.copy()}
+        return state
 
     def _zone_state(self) -> tuple[np.ndarray, float]:
         z = self.skeleton.zones

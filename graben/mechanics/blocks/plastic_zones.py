@@ -1,9 +1,9 @@
 """Zones that yield: Mohr-Coulomb with a tension cut-off and dilation, on the stress in the unrotated block.
 
 Green's strain less the plastic strain that the zone keeps gives the stress S by Hooke's law; where S lies outside
-the strength, the law of mechanics.materials brings it back and what it took is plastic strain. S turns with the block, so
-rotation of any size does nothing. The strength bounds S, which differs from Cauchy's stress by the elastic and plastic
-stretch of the zone: a plastic strain of 1 % by about 1 %.
+the strength, the law of mechanics.materials brings it back, and what it took is plastic strain. S turns with the
+block, so rotation of any size does nothing. The strength bounds S, which differs from Cauchy's stress by the stretch
+of the zone: at a plastic strain of 1 % by about 1 %.
 """
 
 from __future__ import annotations
@@ -102,9 +102,9 @@ def _bring_back(z, stress, zones, rest, none):
 
 @kernel(error_model="numpy")
 def plastic_zone_forces(x, zones, force, begin, end):
-    """Add the forces of the zones, rows begin to end, to `force` (vertices, 2) [N/m]; returns the plastic work [J/m].."""
-    triangles, gradient, area, plastic, flag = zones.triangles, zones.gradient, zones.area, zones.plastic, zones.flag
-    lams, mus = zones.lam, zones.mu
+    """Add the forces of the zones, rows begin to end, to `force` (vertices, 2) [N/m]; the plastic work [J/m]."""
+    triangles, gradient, area = zones.triangles, zones.gradient, zones.area
+    lams, mus, plastic, flag = zones.lam, zones.mu, zones.plastic, zones.flag
     sine, term, cut, slack = zones.bounds[0], zones.bounds[1], zones.bounds[2], zones.bounds[3]
     up, down = 1.0 + sine, 1.0 - sine
     stress, rest, none = np.empty(4), np.zeros(4), np.empty((0, 0))

@@ -47,6 +47,20 @@ LAYOUT = Layout(
         "displacement": Variable(("time", "vertex", "axis"), "m", "displacement since the first state"),
         "velocity": Variable(("time", "vertex", "axis"), "m s-1", "velocity"),
         "zone_stress": Variable(("time", "zone", "component"), "Pa", "Cauchy stress, tension positive"),
+        "zone_plastic_strain": Variable(
+            ("time", "zone"), "1", "equivalent plastic strain, sum of sqrt(2/3 de:de)", optional=True
+        ),
+        "zone_state": Variable(
+            ("time", "zone"),
+            "1",
+            "what the zone does",
+            dtype="i1",
+            optional=True,
+            attributes={
+                "flag_values": [0, 1, 2, 3],
+                "flag_meanings": "elastic in_shear in_tension before",
+            },
+        ),
         "boundary_force": Variable(
             ("time", "vertex", "axis"), "N m-1", "force of walls and pressures on the vertex, per thickness"
         ),
@@ -104,6 +118,9 @@ LAYOUT = Layout(
         "energy_strain": _energy("strain energy of the zones"),
         "energy_joint": _energy("energy stored in the joints"),
         "energy_friction": _energy("energy taken by sliding since the first state"),
+        "energy_plastic": Variable(
+            _T, "J m-1", "energy taken by yielding zones since the first state", optional=True
+        ),
         "energy_damping": _energy("energy taken by damping since the first state"),
         "energy_boundary": _energy("work of moving walls since the first state"),
         "energy_external": _energy("work of pressures and gravity since the first state"),

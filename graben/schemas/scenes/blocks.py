@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from pydantic import model_validator
@@ -76,11 +77,38 @@ class Tessellation(Model):
 
 
 class Rock(Model):
-    """The blocks themselves: elastic, plane strain."""
+    """The blocks themselves, in plane strain; strengths left out are those of Y's granite in UDEC."""
 
+    zones: Literal["elastic", "mohr-coulomb"] = key(
+        "elastic", "elastic: zones deform; mohr-coulomb: they also yield, in shear and in tension"
+    )
     young: Pressure = key("65 GPa", "Young's modulus", gt=0)
     poisson: float = key(0.2, "Poisson's ratio", gt=-1, lt=0.5)
     density: Density = key("2700 kg/m^3", "density", gt=0)
+    friction: Angle | None = key(None, "mohr-coulomb: friction angle; left out: 51 deg", ge=0, le=1.396)
+    cohesion: Pressure | None = key(None, "mohr-coulomb: cohesion; left out: 55.1 MPa", ge=0)
+    tension: Pressure | None = key(
+        None, "mohr-coulomb: tensile strength, cut at the cone's apex; left out: 11.7 MPa", ge=0
+    )
+    dilation: Angle | None = key(None, "mohr-coulomb: dilation angle, at most friction; left out: 0 deg", ge=0)
+
+    @property
+    def strength(self) -> tuple[float, float, float, float]:
+        """Friction [rad], cohesion, tension [Pa], dilation [rad]."""
+        given = (self.friction, self.cohesion, self.tension, self.dilation)
+        left_out = (math.radians(51.0), 55.1e6, 11.7e6, 0.0)
+        friction, cohesion, tension, dilation = (d if g is None else g for g, d in zip(given, left_out, strict=True))
+        return friction, cohesion, tension, dilation
+
+    @model_validator(mode="after")
+    def _only_what_the_zones_use(self) -> Rock:
+        strength = ("friction", "cohesion", "tension", "dilation")
+        unused = ", ".join(name for name in strength if getattr(self, name) is not None)
+        if unused and self.zones != "mohr-coulomb":
+            raise ValueError(f'zones = "mohr-coulomb", because {unused} is given (found "{self.zones}")')
+        if self.strength[3] > self.strength[0]:
+            raise ValueError("dilation of at most the friction angle")
+        return self
 
 
 class Joints(Model):
