@@ -13,8 +13,14 @@ from graben.schemas.faults import BadInput, Fault
 GEOJSON = (".geojson", ".json")
 
 
-def read_polygons(path: Path) -> list[np.ndarray]:
-    """Polygons (m, 2) of a file, coordinates in metres.
+Polygons = tuple[list[np.ndarray], list[np.ndarray]]
+
+
+def read_polygons(path: Path) -> Polygons:
+    """Polygons (m, 2) of a file, coordinates in metres, and the sets of joints (m,) of their edges.
+
+    A feature of GeoJSON tells the sets in its property `joint_sets`, one number for each edge of its polygon from the
+    first corner on; without it, and in meshes, they are 0.
 
     Raises
     ------
@@ -26,40 +32,48 @@ def read_polygons(path: Path) -> list[np.ndarray]:
         raise
     except (Exception, SystemExit) as error:  # meshio raises errors of many kinds, and exits on some
         raise BadInput(Fault(str(path), "", "", f"a file of polygons ({error})")) from error
-    if not found:
+    if not found[0]:
         raise BadInput(Fault(str(path), "", "", "at least one polygon"))
     return found
 
 
-def _geojson(path: Path) -> list[np.ndarray]:
+def _geojson(path: Path) -> Polygons:
     found: list[np.ndarray] = []
+    sets: list[np.ndarray] = []
 
-    def visit(item: dict[str, Any]) -> None:
+    def visit(item: dict[str, Any], given: list[int] | None = None) -> None:
         kind = item["type"]
         if kind == "FeatureCollection":
             for feature in item["features"]:
-                visit(feature["geometry"])
+                visit(feature)
         elif kind == "Feature":
-            visit(item["geometry"])
+            visit(item["geometry"], (item.get("properties") or {}).get("joint_sets"))
         elif kind == "GeometryCollection":
             for geometry in item["geometries"]:
-                visit(geometry)
+                visit(geometry, given)
         elif kind in ("Polygon", "MultiPolygon"):
             for rings in [item["coordinates"]] if kind == "Polygon" else item["coordinates"]:
                 if len(rings) != 1:
                     raise BadInput(Fault(str(path), "coordinates", "", f"polygon {len(found)} without holes"))
                 ring = np.array(rings[0], dtype=float)[:, :2]
                 # GeoJSON repeats the first corner at the end.
-                found.append(ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring)
+                ring = ring[:-1] if np.array_equal(ring[0], ring[-1]) else ring
+                own = np.zeros(len(ring), dtype=np.int64) if given is None else np.array(given)
+                if own.shape != (len(ring),) or own.dtype.kind != "i" or own.min() < 0:
+                    expected = f"polygon {len(found)}: {len(ring)} numbers of sets, from 0 on"
+                    raise BadInput(Fault(str(path), "joint_sets", str(given), expected))
+                found.append(ring)
+                sets.append(own)
 
     visit(json.loads(path.read_text(encoding="utf-8")))
-    return found
+    return found, sets
 
 
-def _mesh(path: Path) -> list[np.ndarray]:
+def _mesh(path: Path) -> Polygons:
     import meshio
 
     mesh = meshio.read(path)
     plane = ("triangle", "quad", "polygon")
     cells = [c for block in mesh.cells if block.type.startswith(plane) for c in block.data]
-    return [np.asarray(mesh.points, dtype=float)[np.asarray(c), :2] for c in cells]
+    found = [np.asarray(mesh.points, dtype=float)[np.asarray(c), :2] for c in cells]
+    return found, [np.zeros(len(ring), dtype=np.int64) for ring in found]

@@ -11,7 +11,6 @@ from graben.mechanics.blocks import snapshot
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.history import History
 from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets
-from graben.mechanics.blocks.joints import Joint
 from graben.mechanics.blocks.mending import mend
 from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.blocks.plastic_zones import Strength
@@ -24,6 +23,7 @@ from graben.schemas.polygon_file import read_polygons
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.stages import blocks_checkpoint
 from graben.stages.blocks_biaxial import Biaxial
+from graben.stages.blocks_joints import joints_of_sets
 from graben.stages.blocks_output import write_vtk
 from graben.stages.blocks_programme import Rising
 from graben.stages.record import Progress, Record, silent
@@ -126,36 +126,27 @@ def _tessellation(scene: BlocksScene) -> Tessellation:
         blocks = voronoi_blocks(outline, t.edge, scene.seed, t.lloyd_passes, t.shortest_edge)
     else:
         if t.file is not None and t.method == "file":
-            shapes = read_polygons(t.file)
+            shapes, marks = read_polygons(t.file)
         else:
             sets = [JointSet(s.dip, s.spacing, s.persistence, s.dip_scatter, s.spacing_scatter) for s in t.sets]
-            shapes = cut_by_sets(outline, sets, scene.seed)
+            shapes, marks = (list(part) for part in zip(*cut_by_sets(outline, sets, scene.seed)))
         limits = [_MENDED * t.edge if given is None else given for given in (t.shortest_edge, t.thinnest)]
-        blocks = mend(shapes, shortest=limits[0], thinnest=limits[1])
+        blocks = mend(shapes, marks if scene.joints.sets else None, shortest=limits[0], thinnest=limits[1])
     return without(blocks, [np.array(hole) for hole in scene.domain.holes])
 
 
 def _model(scene: BlocksScene, tessellation: Tessellation, dt: float, gravity: tuple[float, float]) -> BlockModel:
-    j = scene.joints
-    joint = Joint(
-        j.normal_stiffness,
-        j.shear_stiffness,
-        float(np.tan(j.friction)),
-        j.cohesion,
-        j.tension,
-        float(np.tan(j.dilation)),
-        np.inf if j.dilation_limit is None else j.dilation_limit,
-        # Negative: as for intact joints.
-        -1.0 if j.residual_friction is None else float(np.tan(j.residual_friction)),
-        -1.0 if j.residual_cohesion is None else j.residual_cohesion,
-        j.closure or 0.0,
-    )
+    bodies = build_bodies(tessellation, scene.tessellation.zone_edge)
+    joints, between = joints_of_sets(scene.joints, bodies.edge_set)
     return BlockModel(
-        build_bodies(tessellation, scene.tessellation.zone_edge),
+        bodies,
         young=scene.rock.young,
         poisson=scene.rock.poisson,
         density=scene.rock.density,
-        joint=joint,
+        joint=joints[0],
+        more_joints=joints[1:],
+        edge_set=bodies.edge_set,
+        set_between=between,
         rounding=scene.tessellation.rounding,
         dt=dt,
         gravity=gravity,

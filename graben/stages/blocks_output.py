@@ -45,6 +45,7 @@ def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
             n = int(end[k + 1] - end[k])
             half = 0.5 * arrays["contact_length"][part, None] * arrays["contact_tangent"][part]
             middle = arrays["contact_position"][part]
+            sets = {"set": arrays["contact_set"][part].astype(np.int32)} if "contact_set" in arrays else {}
             joints.add(
                 time,
                 np.vstack([middle - half, middle + half]),
@@ -57,5 +58,6 @@ def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
                     "normal_stress": arrays["contact_normal_stress"][part],
                     "shear_stress": arrays["contact_shear_stress"][part],
                     "force": arrays["contact_force"][part],
+                    **sets,
                 },
             )

@@ -9,7 +9,9 @@ import pytest
 from graben.schemas.artifact import read_artifact
 from graben.schemas.faults import BadInput
 from graben.schemas.polygon_file import read_polygons
+from graben.schemas.scenes.blocks import Joints
 from graben.stages import dem_run
+from graben.stages.blocks_joints import joints_of_sets
 
 BRICKS = [(x, y) for y in (0.0, 1.0, 2.0, 3.0) for x in (0.0, 1.0, 2.0, 3.0)]
 
@@ -30,6 +32,9 @@ steps = 1500
 [output]
 vtk = false
 """
+
+
+ONE_SET = ['tessellation.method="joint-sets"', 'tessellation.sets=[{dip="0 deg",spacing="1 m"}]']
 
 
 @pytest.fixture
@@ -87,6 +92,10 @@ def test_joint_sets_from_a_scene(scene):
         (['tessellation.method="file"'], "tessellation.file"),
         (['tessellation.method="joint-sets"'], "tessellation.sets"),
         (['tessellation.method="file"', 'tessellation.file="bricks.toml"'], "file of polygons"),
+        (["joints.sets=[{set=1}]"], "joint-sets"),
+        ([*ONE_SET, "joints.sets=[{set=1},{set=1}]"], "one entry"),
+        ([*ONE_SET, "joints.sets=[{set=2}]"], "the 1 sets"),
+        ([*ONE_SET, 'joints.sets=[{set=1,friction="5 m"}]'], "joints.sets"),
     ],
 )
 def test_missing_or_foreign_polygons_are_refused(scene, settings, word):
@@ -95,11 +104,64 @@ def test_missing_or_foreign_polygons_are_refused(scene, settings, word):
     assert any(word in str(f) for f in refused.value.faults)
 
 
+def test_joints_of_one_set_from_a_scene(scene):
+    # Bricks of two sets: the horizontal joints, set 1, decide the vertical stiffness.
+    settings = [
+        'tessellation.method="joint-sets"',
+        'tessellation.sets=[{dip="0 deg",spacing="1 m"},{dip="90 deg",spacing="1 m"}]',
+    ]
+    runs, rise = {}, {}
+    for name, sets in (
+        ("same", "[]"),
+        ("soft", '[{set=1,normal_stiffness="2 GPa/m"}]'),
+        ("other", '[{set=2,normal_stiffness="2 GPa/m"}]'),
+    ):
+        output = scene.with_name(f"{name}.nc")
+        headline = dem_run.run(scene, output, overrides=[*settings, f"joints.sets={sets}", "output.vtk=true"])
+        rise[name] = headline["peak_wall_stress_pa"] + 0.25e6
+        runs[name] = read_artifact(output, "blocks")
+    # Of 5 m at 2 mm: rock 4 m / E' and four joints 1 / kn in series, before and after.
+    assert rise["soft"] / rise["same"] == pytest.approx((4 / 67.7 + 0.4) / (4 / 67.7 + 2.0), rel=0.05)
+    assert rise["other"] / rise["same"] == pytest.approx(1.0, abs=0.05)
+    assert "contact_set" not in runs["same"]
+    soft = runs["soft"]
+    along = np.abs(soft.contact_tangent.values[:, 0])
+    assert set(np.unique(soft.contact_set)) <= {0, 1, 2}
+    assert np.all(soft.contact_set.values[along > 0.9] == 1)
+    assert np.all(soft.contact_set.values[along < 0.1] == 2)
+    import pyvista
+
+    joints = pyvista.get_reader(scene.with_name("soft-joints.pvd")).read()[0]
+    assert set(np.unique(joints["set"])) <= {0, 1, 2}
+
+
+def test_where_edges_of_two_sets_meet_the_weaker_decides():
+    rough = {"friction": "40 deg"}
+    joints = Joints.model_validate(
+        {"sets": [rough | {"set": 1}, {"set": 2, "friction": "20 deg"}, {"set": 3, "cohesion": "50 kPa"}]}
+    )
+    found, between = joints_of_sets(joints, np.array([0, 1, 3]))
+    assert [round(float(np.degrees(np.arctan(j.friction)))) for j in found] == [32, 40, 20, 32]
+    assert between.tolist() == [[0, 0, 2, 3], [0, 1, 2, 3], [2, 2, 2, 2], [3, 3, 2, 3]]
+
+
+def test_sets_of_edges_from_a_file(tmp_path):
+    path = tmp_path / "a.geojson"
+    square = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
+    feature = {"type": "Feature", "geometry": {"type": "Polygon", "coordinates": [square]}}
+    path.write_text(json.dumps(feature | {"properties": {"joint_sets": [0, 1, 2, 0]}}))
+    assert read_polygons(path)[1][0].tolist() == [0, 1, 2, 0]
+    for wrong in ([0, 1], [0, 1, 2, -1], [0.5, 1, 2, 3]):
+        path.write_text(json.dumps(feature | {"properties": {"joint_sets": wrong}}))
+        with pytest.raises(BadInput, match="joint_sets"):
+            read_polygons(path)
+
+
 def test_multipolygons_and_holes(tmp_path):
     path = tmp_path / "a.geojson"
     square = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
     path.write_text(json.dumps({"type": "MultiPolygon", "coordinates": [[square], [square]]}))
-    assert len(read_polygons(path)) == 2
+    assert len(read_polygons(path)[0]) == 2
     path.write_text(json.dumps({"type": "Polygon", "coordinates": [square, square]}))
     with pytest.raises(BadInput, match="without holes"):
         read_polygons(path)

@@ -27,7 +27,8 @@ class Bodies:
     zone_vertex : (zones, 3) counter-clockwise; zone_block : (zones,)
     edge_from, edge_to : (outline edges,) vertices of the outline edges, block by block, counter-clockwise
     outline : (m, 2) of the domain [m]; vertex_side : (vertices, m) whether a vertex lies on a side of the domain;
-    edge_side : (outline edges,) side of the domain on which an edge lies, -1 for inner ones
+    edge_side : (outline edges,) side of the domain on which an edge lies, -1 for inner ones; edge_set : (outline
+    edges,) its set of joints, None: all of set 0
     """
 
     position: np.ndarray
@@ -42,6 +43,7 @@ class Bodies:
     outline: np.ndarray
     vertex_side: np.ndarray
     edge_side: np.ndarray
+    edge_set: np.ndarray | None = None
 
 
 def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> Bodies:
@@ -50,7 +52,7 @@ def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> 
     A refined block is split evenly (each triangle into k x k), so its zones fit; blocks need not match.
     """
     points, start, corner = tessellation.points, tessellation.start, tessellation.corner
-    position, zones, edges = [], [], []
+    position, zones, edges, sets = [], [], [], []
     corners: list = [None] * tessellation.size
     owner: list = []
     offset = 0
@@ -65,6 +67,8 @@ def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> 
         position.append(xy)
         zones.append(tri + offset)
         edges.append(np.column_stack([loop, np.roll(loop, -1)]) + offset)
+        if tessellation.edge_set is not None:
+            sets.append(np.repeat(tessellation.edge_set[start[b] : start[b + 1]], k))
         corners[b] = np.arange(len(ring)) + offset
         owner.append(np.full(len(xy), b))
         offset += len(xy)
@@ -92,6 +96,7 @@ def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> 
         outline=tessellation.outline,
         vertex_side=on_side,
         edge_side=edge_side,
+        edge_set=np.concatenate(sets) if sets else None,
     )
 
 

@@ -26,16 +26,24 @@ class JointSet:
     spacing_scatter: float = 0.0
 
 
-def cut_by_sets(outline: np.ndarray, sets: list[JointSet], seed: int) -> list[np.ndarray]:
-    """Blocks (m, 2) counter-clockwise that the joints of all sets, one set after the other, leave of the outline."""
+# A polygon (m, 2) and, of the edge from each of its corners to the next, the set of joints that cut it (0: none).
+Marked = tuple[np.ndarray, np.ndarray]
+
+
+def cut_by_sets(outline: np.ndarray, sets: list[JointSet], seed: int) -> list[Marked]:
+    """Blocks, counter-clockwise, that the joints of all sets, one set after the other, leave of the outline.
+
+    The first set has the number 1; sides of the outline have 0.
+    """
     rng = np.random.Generator(np.random.PCG64(seed))
     outline = np.asarray(outline, dtype=float)
-    blocks = [outline if polygons.signed_area(outline) > 0.0 else outline[::-1].copy()]
-    for joints in sets:
+    ring = outline if polygons.signed_area(outline) > 0.0 else outline[::-1].copy()
+    blocks: list[Marked] = [(ring, np.zeros(len(ring), dtype=np.int64))]
+    for number, joints in enumerate(sets, start=1):
         for point, direction in _lines(outline, joints, rng):
             left = []
             for block in blocks:
-                pieces = split(block, point, direction)
+                pieces = split(block, point, direction, number)
                 # One draw for each block that is crossed, whatever the persistence.
                 crossed = len(pieces) > 1
                 left += pieces if crossed and rng.random() < joints.persistence else [block]
@@ -56,21 +64,23 @@ def _lines(outline: np.ndarray, joints: JointSet, rng: np.random.Generator):
         at += joints.spacing * max(0.1, 1.0 + joints.spacing_scatter * rng.standard_normal())
 
 
-def split(ring: np.ndarray, point: np.ndarray, direction: np.ndarray) -> list[np.ndarray]:
-    """The pieces of a simple polygon (m, 2) on both sides of a line; [ring] where the line misses it."""
+def split(block: Marked, point: np.ndarray, direction: np.ndarray, number: int = 0) -> list[Marked]:
+    """The pieces of a simple polygon on both sides of a line, cut edges marked `number`; [block] where it misses."""
+    ring, marks = block
     r = ring - point
     side = direction[0] * r[:, 1] - direction[1] * r[:, 0]
     # A corner on the line counts as above it, by a hair.
     size = float(np.ptp(ring, axis=0).max())
     side = np.where(np.abs(side) < 1e-9 * size, 1e-9 * size, side)
-    return [p for p in _split(ring, side, point, direction) if abs(polygons.signed_area(p)) > 1e-12 * size**2]
+    pieces = _split(ring, marks, side, point, direction, number)
+    return [p for p in pieces if abs(polygons.signed_area(p[0])) > 1e-12 * size**2]
 
 
-def _split(ring, side, point, direction) -> list[np.ndarray]:
+def _split(ring, marks, side, point, direction, number) -> list[Marked]:
     following = np.roll(side, -1)
     crossed = np.flatnonzero((side > 0.0) != (following > 0.0))
     if len(crossed) == 0:
-        return [ring]
+        return [(ring, marks)]
     f = side[crossed] / (side[crossed] - following[crossed])
     at = ring[crossed] + f[:, None] * (np.roll(ring, -1, axis=0)[crossed] - ring[crossed])
     # The line enters at its first crossing and leaves at the second: a chord, which parts the polygon in two.
@@ -79,12 +89,14 @@ def _split(ring, side, point, direction) -> list[np.ndarray]:
     i, j = int(crossed[first]), int(crossed[second])
     p, q = at[first], at[second]
     pieces = []
-    for inner, inner_side, ends in (
-        (ring[i + 1 : j + 1], side[i + 1 : j + 1], (p, q)),
-        (np.vstack([ring[j + 1 :], ring[: i + 1]]), np.concatenate([side[j + 1 :], side[: i + 1]]), (q, p)),
+    around = np.arange(len(ring))
+    for k, inner, ends in (
+        (i, around[i + 1 : j + 1], (p, q)),
+        (j, np.concatenate([around[j + 1 :], around[: i + 1]]), (q, p)),
     ):
-        whole = np.vstack([ends[0], inner, ends[1]])
+        whole = np.vstack([ends[0], ring[inner], ends[1]])
         # The ends lie on the line: each goes with its neighbour, so this chord is not found again.
-        sides = np.concatenate([inner_side[:1], inner_side, inner_side[-1:]])
-        pieces += _split(whole, sides, point, direction)
+        sides = side[np.concatenate([inner[:1], inner, inner[-1:]])]
+        edges = np.concatenate([marks[[k]], marks[inner], [number]])
+        pieces += _split(whole, edges, sides, point, direction, number)
     return pieces

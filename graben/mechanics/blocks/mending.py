@@ -3,48 +3,98 @@
 The rule: a block with less than `smallest` of the median area, or whose width (area over longest diagonal) is below
 `thinnest`, is merged into the neighbour with which it shares the longest boundary, smallest first; then edges below
 `shortest` are collapsed as in `tessellation.collapse_short_edges`; then corners that do not turn are dropped.
+
+Edges keep the set of joints that they came with: parts of an edge that of the edge, edges that become one that of the
+longest. Where two polygons disagree about their common edge, the first one counts.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections import defaultdict
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from graben.mechanics.blocks import polygons
-from graben.mechanics.blocks.tessellation import Tessellation, collapse_short_edges, from_rings, shared_points
+from graben.mechanics.blocks.tessellation import (
+    Marks,
+    Tessellation,
+    collapse_short_edges,
+    edge_key,
+    edges_of,
+    from_rings,
+    shared_points,
+)
 
 _STRAIGHT = 1e-6
 
 
-def mend(shapes: list[np.ndarray], *, shortest: float, thinnest: float, smallest: float = 0.02) -> Tessellation:
+def mend(
+    shapes: list[np.ndarray],
+    edge_sets: list[np.ndarray] | None = None,
+    *,
+    shortest: float,
+    thinnest: float,
+    smallest: float = 0.02,
+) -> Tessellation:
     """Blocks from polygons (m, 2) [m] that fill a domain without overlaps. ValueError where they do not.
 
+    edge_sets : for each polygon the sets of joints (m,) of the edges from each corner to the next; None: one set
     shortest, thinnest : [m]; smallest : share of the median area
     """
-    shapes = [s if polygons.signed_area(s) > 0.0 else s[::-1] for s in (np.asarray(s, float) for s in shapes)]
+    given = [np.asarray(s, float) for s in shapes]
+    shapes = [s if polygons.signed_area(s) > 0.0 else s[::-1] for s in given]
     for k, shape in enumerate(shapes):
         if len(shape) < 3 or not polygons.is_simple(shape):
             raise ValueError(f"polygon {k} is no simple polygon")
     points, rings = shared_points(shapes)
-    rings = _with_hanging_points(points, rings)
+    marks = None if edge_sets is None else _marks(points, given, edge_sets)
+    rings = _with_hanging_points(points, rings, marks)
     _refuse_overlaps(points, rings)
     rings = _merge_slivers(points, rings, thinnest, smallest)
     outline = outer_boundary(points, rings)
-    blocks = from_rings(points, rings, outline)
+    blocks = from_rings(points, rings, outline, marks)
     if shortest > 0.0:
         blocks = collapse_short_edges(blocks, shortest)
-    rings = [blocks.corner[a:b].tolist() for a, b in zip(blocks.start[:-1], blocks.start[1:])]
-    return from_rings(blocks.points, [_turning(blocks.points, ring) for ring in rings], outline)
+    turning = [_turning(blocks.points, ring) for ring in blocks.rings]
+    marks = blocks.marks
+    if marks is not None:
+        for ring, kept in zip(blocks.rings, turning):
+            _mark_straight_runs(blocks.points, ring, set(kept), marks)
+    return from_rings(blocks.points, turning, outline, marks)
+
+
+def _marks(points: np.ndarray, shapes: list[np.ndarray], edge_sets: list[np.ndarray]) -> Marks:
+    number = np.split(cKDTree(points).query(np.vstack(shapes))[1], np.cumsum([len(s) for s in shapes])[:-1])
+    marks: Marks = {}
+    for ring, sets in zip(number, edge_sets, strict=True):
+        for (a, b), mark in zip(edges_of(ring.tolist()), sets.tolist(), strict=True):
+            if a != b:
+                marks.setdefault(edge_key(a, b), mark)
+    return marks
+
+
+def _mark_straight_runs(points: np.ndarray, ring: list[int], kept: set[int], marks: Marks) -> None:
+    """Edges that replace several edges of a ring in one line get the set of the longest."""
+    first = next(k for k, p in enumerate(ring) if p in kept)
+    ring = ring[first:] + ring[:first]
+    begin, longest, mark = ring[0], 0.0, 0
+    for a, b in edges_of(ring):
+        length = float(np.hypot(*(points[b] - points[a])))
+        if length > longest:
+            longest, mark = length, marks.get(edge_key(a, b), 0)
+        if b in kept:
+            marks[edge_key(begin, b)] = mark
+            begin, longest = b, 0.0
 
 
 def outer_boundary(points: np.ndarray, rings: list[list[int]]) -> np.ndarray:
     """Corners (m, 2) of the largest closed curve of edges that belong to one block only, straight runs joined."""
     following = defaultdict(list)
-    twins = {(b, a) for ring in rings for a, b in _edges(ring)}
+    twins = {(b, a) for ring in rings for a, b in edges_of(ring)}
     for ring in rings:
-        for a, b in _edges(ring):
+        for a, b in edges_of(ring):
             if (a, b) not in twins:
                 following[a].append(b)
     best, largest = None, 0.0
@@ -69,10 +119,6 @@ def outer_boundary(points: np.ndarray, rings: list[list[int]]) -> np.ndarray:
     return best
 
 
-def _edges(ring: list[int]):
-    return zip(ring, ring[1:] + ring[:1])
-
-
 def _turning(points: np.ndarray, ring: list[int]) -> list[int]:
     """The corners of a ring at which it turns."""
     xy = points[ring]
@@ -83,15 +129,15 @@ def _turning(points: np.ndarray, ring: list[int]) -> list[int]:
     return kept if len(kept) > 2 else ring
 
 
-def _with_hanging_points(points: np.ndarray, rings: list[list[int]]) -> list[list[int]]:
+def _with_hanging_points(points: np.ndarray, rings: list[list[int]], marks: Marks | None) -> list[list[int]]:
     """Rings with the corners of others that lie on their edges put in, so that neighbours share edges."""
     tree = cKDTree(points)
     tolerance = 1e-7 * float(np.ptp(points, axis=0).max())
-    twins = {(b, a) for ring in rings for a, b in _edges(ring)}
+    twins = {(b, a) for ring in rings for a, b in edges_of(ring)}
     result = []
     for ring in rings:
         whole = []
-        for a, b in _edges(ring):
+        for a, b in edges_of(ring):
             whole.append(a)
             if (a, b) in twins:
                 continue
@@ -102,7 +148,11 @@ def _with_hanging_points(points: np.ndarray, rings: list[list[int]]) -> list[lis
             along = r @ d / length
             off = np.abs(r[:, 0] * d[1] - r[:, 1] * d[0]) / length
             on = (off < tolerance) & (along > tolerance) & (along < length - tolerance)
-            whole += near[on][np.argsort(along[on])].tolist()
+            between = near[on][np.argsort(along[on])].tolist()
+            whole += between
+            if marks is not None:
+                for p, q in itertools.pairwise([a, *between, b]):
+                    marks.setdefault(edge_key(p, q), marks.get(edge_key(a, b), 0))
         result.append(whole)
     return result
 
@@ -110,7 +160,7 @@ def _with_hanging_points(points: np.ndarray, rings: list[list[int]]) -> list[lis
 def _refuse_overlaps(points: np.ndarray, rings: list[list[int]]) -> None:
     seen: dict[tuple[int, int], int] = {}
     for k, ring in enumerate(rings):
-        for edge in _edges(ring):
+        for edge in edges_of(ring):
             if edge in seen:
                 raise ValueError(f"polygons {seen[edge]} and {k} overlap")
             seen[edge] = k
@@ -124,7 +174,7 @@ def _merge_slivers(points, rings, thinnest: float, smallest: float) -> list[list
     area = np.array([polygons.signed_area(points[r]) for r in rings])
     limit = smallest * float(np.median(area))
     alive: dict[int, list[int]] = dict(enumerate(rings))
-    owner = {edge: k for k, ring in alive.items() for edge in _edges(ring)}
+    owner = {edge: k for k, ring in alive.items() for edge in edges_of(ring)}
     for k in np.argsort(area, kind="stable").tolist():
         ring = alive[k]
         xy = points[ring]
@@ -132,18 +182,18 @@ def _merge_slivers(points, rings, thinnest: float, smallest: float) -> list[list
         if polygons.signed_area(xy) >= limit and polygons.signed_area(xy) >= thinnest * longest:
             continue
         shared: dict[int, float] = defaultdict(float)
-        for a, b in _edges(ring):
+        for a, b in edges_of(ring):
             if (b, a) in owner:
                 shared[owner[b, a]] += float(np.hypot(*(points[b] - points[a])))
         for other in sorted(shared, key=lambda n: (-shared[n], n)):
             merged = _union(ring, alive[other])
             if merged is None:
                 continue
-            for edge in _edges(ring):
+            for edge in edges_of(ring):
                 owner.pop(edge)
-            for edge in _edges(alive[other]):
+            for edge in edges_of(alive[other]):
                 owner.pop(edge)
-            owner |= dict.fromkeys(_edges(merged), other)
+            owner |= dict.fromkeys(edges_of(merged), other)
             alive[other] = merged
             del alive[k]
             break
@@ -152,7 +202,7 @@ def _merge_slivers(points, rings, thinnest: float, smallest: float) -> list[list
 
 def _union(a: list[int], b: list[int]) -> list[int] | None:
     """The ring around two that share edges; None where it is not one simple ring."""
-    both = list(_edges(a)) + list(_edges(b))
+    both = list(edges_of(a)) + list(edges_of(b))
     inside = set(both)
     ahead = {p: q for p, q in both if (q, p) not in inside}
     if len(ahead) != sum((q, p) not in inside for p, q in both) or not ahead:

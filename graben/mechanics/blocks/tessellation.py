@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,18 +27,46 @@ _REFLEX_SINE = 0.05
 _NEEDLE_SINE = 0.17
 
 
+# Sets of joints by the numbers of the points at both ends of an edge, the lower first.
+Marks = dict[tuple[int, int], int]
+
+
+def edge_key(a: int, b: int) -> tuple[int, int]:
+    """Key of an edge in `Marks`."""
+    return (a, b) if a < b else (b, a)
+
+
+def edges_of(ring: list[int]) -> Iterator[tuple[int, int]]:
+    """Pairs of corners along a ring, from its first."""
+    return zip(ring, ring[1:] + ring[:1])
+
+
 @dataclass(frozen=True)
 class Tessellation:
     """Blocks that fill an outline; blocks share points here, and part when zones are made.
 
     points : (p, 2) [m]; start : (blocks + 1,); corner : indices into points, counter-clockwise per block;
-    outline : (m, 2) [m] counter-clockwise.
+    outline : (m, 2) [m] counter-clockwise; edge_set : (corners,) set of joints of the edge from each corner to the
+    next, None: all of set 0.
     """
 
     points: np.ndarray
     start: np.ndarray
     corner: np.ndarray
     outline: np.ndarray
+    edge_set: np.ndarray | None = None
+
+    @property
+    def rings(self) -> list[list[int]]:
+        """Point numbers of the corners, block by block."""
+        return [self.corner[a:b].tolist() for a, b in itertools.pairwise(self.start)]
+
+    @property
+    def marks(self) -> Marks | None:
+        """Set of joints of each edge, by the numbers of its ends."""
+        if self.edge_set is None:
+            return None
+        return dict(zip((edge_key(*e) for ring in self.rings for e in edges_of(ring)), self.edge_set.tolist()))
 
     @property
     def size(self) -> int:
@@ -118,8 +147,8 @@ def without(tessellation: Tessellation, holes: list[np.ndarray]) -> Tessellation
         return tessellation
     if gone.all():
         raise ValueError("holes: no block is left")
-    rings = [corner[a:b].tolist() for k, (a, b) in enumerate(itertools.pairwise(start)) if not gone[k]]
-    return from_rings(points, rings, tessellation.outline)
+    rings = [ring for ring, out in zip(tessellation.rings, gone) if not out]
+    return from_rings(points, rings, tessellation.outline, tessellation.marks)
 
 
 def _random_points(outline: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
@@ -191,14 +220,19 @@ def _equal_points(points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.
     return number, first
 
 
-def from_rings(points: np.ndarray, rings: list[list[int]], outline: np.ndarray) -> Tessellation:
-    """A tessellation of rings of point numbers; points that no ring uses are dropped."""
+def from_rings(
+    points: np.ndarray, rings: list[list[int]], outline: np.ndarray, marks: Marks | None = None
+) -> Tessellation:
+    """A tessellation of rings of point numbers; points that no ring uses are dropped. Edges not in marks have 0."""
     used = np.unique(np.concatenate([np.array(r) for r in rings]))
     renumber = np.full(len(points), -1)
     renumber[used] = np.arange(len(used))
     start = np.concatenate([[0], np.cumsum([len(r) for r in rings])]).astype(np.int64)
     corner = renumber[np.concatenate([np.array(r) for r in rings])].astype(np.int64)
-    return Tessellation(np.ascontiguousarray(points[used]), start, corner, outline)
+    sets = None
+    if marks is not None:
+        sets = np.array([marks.get(edge_key(*e), 0) for ring in rings for e in edges_of(ring)], dtype=np.int64)
+    return Tessellation(np.ascontiguousarray(points[used]), start, corner, outline, sets)
 
 
 def collapse_short_edges(tessellation: Tessellation, shortest: float) -> Tessellation:
@@ -206,12 +240,11 @@ def collapse_short_edges(tessellation: Tessellation, shortest: float) -> Tessell
 
     The ends of an inner edge meet in its middle; an end on the outline stays on it, a corner of the outline
     stays put. An edge stays if a block around it would lose its third corner, or get a corner that turns inwards or
-    is a needle, or if its ends lie on different sides.
+    is a needle, or if its ends lie on different sides. The other edges keep their sets of joints.
     """
     points = tessellation.points.copy()
     outline = tessellation.outline
-    start, corner = tessellation.start, tessellation.corner
-    rings = [corner[a:b].tolist() for a, b in itertools.pairwise(start)]
+    rings, marks = tessellation.rings, tessellation.marks
     tolerance = 1e-6 * float(np.ptp(outline, axis=0).max())
     on_side = polygons.distance_to_sides(points, outline) < tolerance
     sides = [frozenset(np.flatnonzero(row).tolist()) for row in on_side]
@@ -251,6 +284,11 @@ def collapse_short_edges(tessellation: Tessellation, shortest: float) -> Tessell
             points[i], points[j] = before
             continue
         alive[j] = False
+        if marks is not None:
+            for b in blocks_at[j]:
+                k = rings[b].index(j)
+                for p in (rings[b][k - 1], rings[b][(k + 1) % len(rings[b])]):
+                    marks.setdefault(edge_key(p, i), marks.get(edge_key(p, j), 0))
         for b, ring in changed.items():
             rings[b] = ring
         blocks_at[i] |= blocks_at[j]
@@ -259,7 +297,7 @@ def collapse_short_edges(tessellation: Tessellation, shortest: float) -> Tessell
             k = ring.index(i)
             push(i, ring[k - 1])
             push(i, ring[(k + 1) % len(ring)])
-    return from_rings(points, rings, outline)
+    return from_rings(points, rings, outline, marks)
 
 
 def _joined(rings, blocks_at, i: int, j: int) -> bool:

@@ -111,6 +111,22 @@ class Rock(Model):
         return self
 
 
+class JointsOfSet(Model):
+    """Joints of one set that differ from the others; what is left out is as in [joints]."""
+
+    set: int = key(..., "number of the set: the first of [[tessellation.sets]] is 1; as numbered in a file", ge=1)
+    normal_stiffness: JointStiffness | None = key(None, "normal stiffness", gt=0)
+    shear_stiffness: JointStiffness | None = key(None, "shear stiffness", gt=0)
+    friction: Angle | None = key(None, "friction angle", ge=0, lt=1.57)
+    cohesion: Pressure | None = key(None, "cohesion", ge=0)
+    tension: Pressure | None = key(None, "tensile strength", ge=0)
+    dilation: Angle | None = key(None, "dilation angle", ge=0, lt=1.57)
+    dilation_limit: Length | None = key(None, "net slip at which dilation stops", gt=0)
+    residual_friction: Angle | None = key(None, "friction once a joint has broken", ge=0, lt=1.57)
+    residual_cohesion: Pressure | None = key(None, "cohesion once a joint has broken", ge=0)
+    closure: Length | None = key(None, "largest closure of joints that stiffen", gt=0)
+
+
 class Joints(Model):
     """Coulomb slip with area contact; the defaults are those of Y table 4.1, tension as in the UDEC model (0)."""
 
@@ -131,6 +147,16 @@ class Joints(Model):
         "left out: linear",
         gt=0,
     )
+    sets: list[JointsOfSet] = key(
+        [],
+        "joint-sets and file: joints of one set with properties of their own (repeatable); where edges of two sets "
+        "meet, after blocks have moved, the joint is that of lower friction, then of lower cohesion",
+    )
+
+    def of_set(self, number: int) -> Joints:
+        """Properties of the joints of a set."""
+        own = [s.model_dump(exclude_none=True, exclude={"set"}) for s in self.sets if s.set == number]
+        return self.model_copy(update=own[0]) if own else self
 
 
 class Output(Model):
@@ -169,6 +195,13 @@ class BlocksScene(Scene):
             faults.append('tessellation.file, because method = "file"')
         if t.method == "joint-sets" and not t.sets:
             faults.append('at least one [[tessellation.sets]], because method = "joint-sets"')
+        numbers = [s.set for s in self.joints.sets]
+        if numbers and t.method == "voronoi":
+            faults.append('tessellation.method = "joint-sets" or "file", because of [[joints.sets]]')
+        elif len(set(numbers)) < len(numbers):
+            faults.append(f"one entry of [[joints.sets]] for each set (found sets {numbers})")
+        elif numbers and t.method == "joint-sets" and max(numbers) > len(t.sets):
+            faults.append(f"joints.sets of the {len(t.sets)} sets in [[tessellation.sets]] (found {max(numbers)})")
         if t.rounding > 0.25 * t.edge:
             faults.append(f"tessellation.rounding of at most a quarter of the edge (found {t.rounding:.4g} m)")
         if t.shortest_edge is not None and t.shortest_edge > t.edge:

@@ -18,20 +18,29 @@ def area(shapes):
     return sum(polygons.signed_area(s) for s in shapes)
 
 
+def pieces_of(ring, point, direction):
+    return [p for p, _ in split((ring, np.zeros(len(ring), dtype=int)), np.array(point), np.array(direction))]
+
+
+def cut(outline, sets, seed):
+    """Shapes and the sets of their edges."""
+    return [list(part) for part in zip(*cut_by_sets(outline, sets, seed))]
+
+
 def test_a_line_parts_a_comb_in_all_its_teeth():
-    pieces = split(COMB, np.array([0.0, 2.0]), np.array([1.0, 0.0]))
+    pieces = pieces_of(COMB, [0.0, 2.0], [1.0, 0.0])
     assert len(pieces) == 4
     assert area(pieces) == pytest.approx(polygons.signed_area(COMB), rel=1e-12)
     assert sorted(round(polygons.signed_area(p), 9) for p in pieces)[:3] == [1.0, 1.0, 1.0]
     # Through a corner, along a side, beside it.
-    assert len(split(COMB, np.array([0.0, 0.0]), np.array([1.0, 0.0]))) == 1
-    assert area(split(COMB, np.array([0.0, 1.0]), np.array([1.0, 0.0]))) == pytest.approx(area([COMB]))
-    assert area(split(COMB, np.array([0.0, 0.0]), np.array([0.6, 0.8]))) == pytest.approx(area([COMB]))
+    assert len(pieces_of(COMB, [0.0, 0.0], [1.0, 0.0])) == 1
+    assert area(pieces_of(COMB, [0.0, 1.0], [1.0, 0.0])) == pytest.approx(area([COMB]))
+    assert area(pieces_of(COMB, [0.0, 0.0], [0.6, 0.8])) == pytest.approx(area([COMB]))
 
 
 def test_two_sets_across_each_other_give_bricks():
     square = np.array([(0, 0), (4, 0), (4, 4), (0, 4)], dtype=float)
-    shapes = cut_by_sets(square, [JointSet(0.0, 1.0), JointSet(np.pi / 2, 0.5)], seed=1)
+    shapes, _ = cut(square, [JointSet(0.0, 1.0), JointSet(np.pi / 2, 0.5)], seed=1)
     assert area(shapes) == pytest.approx(16.0)
     sizes = np.array([np.ptp(s, axis=0) for s in shapes])
     inner = np.all(np.isclose(sizes, [0.5, 1.0]), axis=1)
@@ -47,19 +56,28 @@ def test_scattered_sets_are_mended_into_sound_blocks(seed):
         JointSet(np.radians(20), 0.6, 0.8, np.radians(6), 0.4),
         JointSet(np.radians(-65), 0.7, 0.6, np.radians(10), 0.4),
     ]
-    shapes = cut_by_sets(SLOPE, sets, seed)
+    shapes, marks = cut(SLOPE, sets, seed)
     assert area(shapes) == pytest.approx(polygons.signed_area(SLOPE), rel=1e-9)
-    blocks = mend(shapes, shortest=0.15, thinnest=0.08)
+    blocks = mend(shapes, marks, shortest=0.15, thinnest=0.08)
     found, _ = polygons.areas_and_centroids(blocks.points, blocks.start, blocks.corner)
     # Corners that a collapse moved were inside or moved along the outline.
     assert found.sum() == pytest.approx(polygons.signed_area(SLOPE), rel=1e-6)
     assert found.min() > 0.015 * np.median([polygons.signed_area(s) for s in shapes])
     assert blocks.size > 20
-    bodies = build_bodies(blocks)
+    # Every edge inside knows its set, and those long enough to have a direction run along its joints.
+    bodies = build_bodies(blocks, 0.5)
+    edge = bodies.position[bodies.edge_to] - bodies.position[bodies.edge_from]
+    assert np.all((bodies.edge_set == 0) == (bodies.edge_side >= 0))
+    for number, joints in enumerate(sets, start=1):
+        long = (bodies.edge_set == number) & (np.hypot(*edge.T) > 0.3)
+        off = np.angle(np.exp(2j * (np.arctan2(*edge[long].T[::-1]) - joints.dip))) / 2
+        assert long.sum() > 20
+        assert np.abs(off).max() < np.radians(45)
+        assert np.abs(off).mean() < 2.0 * joints.dip_scatter
     assert bodies.block_area.sum() == pytest.approx(polygons.signed_area(SLOPE), rel=1e-6)
     # The outline is the domain's, straight sides in one piece.
     assert np.allclose(sorted(map(tuple, np.round(blocks.outline, 6))), sorted(map(tuple, SLOPE)))
-    again = mend(cut_by_sets(SLOPE, sets, seed), shortest=0.15, thinnest=0.08)
+    again = mend(*cut(SLOPE, sets, seed), shortest=0.15, thinnest=0.08)
     assert np.array_equal(again.points, blocks.points)
 
 
