@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from graben.mechanics.blocks.joints import scatter_nodes
 from graben.mechanics.blocks.model import BlockModel
+from graben.mechanics.blocks.nodes import scatter_nodes
 
 
 class Balance(NamedTuple):

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from graben.mechanics.blocks.memory import ask_for
+from graben.mechanics.blocks.nodes import LENGTH, RIM, TX, TY, X, Y
 from graben.mechanics.compiled import kernel
 
 # Edges count as facing each other up to 60 degrees, fully up to 45: forces fade in between.
@@ -24,9 +24,6 @@ FACING_NONE, FACING_FULL = 0.5, 0.7
 # A chamfer bears on no more than this share of its length less than the interval that it shares with another edge:
 # chamfers begin where their neighbour's contact ends, and would all touch by their rims, for next to no force.
 RIM_SHARE = 0.1
-
-# Pairs between the one in work and the one whose data are asked for.
-_AHEAD = 6
 
 STICK, SLIP, OPEN, BROKEN = 0, 1, 2, 3
 
@@ -113,52 +110,8 @@ class Pairs(NamedTuple):
     joint: np.ndarray
 
 
-# Columns of the node table: position, velocity, and of the edge that starts there unit tangent, length and rim
-# (0 but for chamfers). One cache line a node, since the contact kernel reads nodes in no order.
-X, Y, VX, VY, TX, TY, LENGTH, RIM, COLUMNS = 0, 1, 2, 3, 4, 5, 6, 7, 8
-
-
 @kernel(error_model="numpy")
-def node_motion(x, v, first, second, weight, follow, node, begin, end):
-    """Fill rows begin to end of the node table (nodes, 8) from positions x and velocities v (vertices, 2); RIM stays.
-
-    Rows begin and end with a block.
-    """
-    last = node.shape[0] - 1
-    for i in range(begin, end):
-        ask_for(node, min(i + _AHEAD, last))
-        a = first[i]
-        b = second[i]
-        w = weight[i]
-        node[i, X] = x[a, 0] + w * (x[b, 0] - x[a, 0])
-        node[i, Y] = x[a, 1] + w * (x[b, 1] - x[a, 1])
-        node[i, VX] = v[a, 0] + w * (v[b, 0] - v[a, 0])
-        node[i, VY] = v[a, 1] + w * (v[b, 1] - v[a, 1])
-    for i in range(begin, end):
-        j = follow[i]
-        dx = node[j, X] - node[i, X]
-        dy = node[j, Y] - node[i, Y]
-        length = np.sqrt(dx * dx + dy * dy)
-        inverse = 1.0 / length
-        node[i, TX] = dx * inverse
-        node[i, TY] = dy * inverse
-        node[i, LENGTH] = length
-
-
-@kernel(error_model="numpy")
-def scatter_nodes(fn, first, second, weight, force, begin, end):
-    """Hand the forces on contact nodes, rows begin to end, back to the vertices that they blend."""
-    for i in range(begin, end):
-        a = first[i]
-        b = second[i]
-        w = weight[i]
-        for d in range(2):
-            force[a, d] += (1.0 - w) * fn[i, d]
-            force[b, d] += w * fn[i, d]
-
-
-@kernel(error_model="numpy")
-def _bearing(length, gap0, gap1, rim):
+def bearing(length, gap0, gap1, rim):
     """Length over which two edges bear that share an interval `length`: all of it, unless one is a chamfer.
 
     A plain edge keeps the half length of each end whole, as the reference model does. A chamfer stands for a
@@ -168,217 +121,6 @@ def _bearing(length, gap0, gap1, rim):
         return length
     share = 1.0 if gap0 * gap1 >= 0.0 else abs(min(gap0, gap1)) / abs(gap1 - gap0)
     return share * max(0.0, length - rim)
-
-
-@kernel(error_model="numpy")
-def forget(shear, flag, intact, c):
-    """An open contact remembers no stress; what slid stays, and so does the mark of a broken joint."""
-    for k in range(2):
-        shear[c, k] = 0.0
-        if flag[c, k] != BROKEN:
-            if intact[c] == 1 and flag[c, k] != OPEN:
-                flag[c, k] = BROKEN
-            else:
-                flag[c, k] = OPEN
-
-
-@kernel(error_model="numpy")
-def contact_forces(
-    active, begin, stop, pairs, follow, node, table, joint, deepest, dt, fn, node_end, far_of, far, sums
-):
-    """Stress update and forces of the active candidates; returns the pair that overlaps too much, or -1.
-
-    active[begin:stop] : indices into pairs, all of set `joint` of table; node : node table
-    fn : (nodes, 2) forces, added to [N/m]; those on the second edge, if it lies at or beyond node_end, go to row
-    far_of[pair] of far (rows, 4) instead
-    deepest : overlap above which a touching pair stops the run, and others are no contact [m]
-    sums : [friction work, largest overlap], added to; the work that dilation gives back is not friction
-    """
-    # Taken out of the tuple once: inside the loop each look-up would count references.
-    first, second, shears, slips = pairs.first, pairs.second, pairs.shear, pairs.slip
-    flags, live, intact = pairs.flag, pairs.live, pairs.intact
-    kn, ks, peak_friction, peak_cohesion = table[joint, 0], table[joint, 1], table[joint, 2], table[joint, 3]
-    tensile, dilation, limit = table[joint, 4], table[joint, 5], table[joint, 6]
-    residual_friction, residual_cohesion, closure = table[joint, 7], table[joint, 8], table[joint, 9]
-    weakens = residual_friction >= 0.0
-    compliance = 1.0 / ks
-    ksdt = ks * dt
-    last = node.shape[0] - 1
-    friction_work = 0.0
-    largest = sums[1]
-    for m in range(begin, stop):
-        # Edges face each other in no order of memory: ask early for what is due some pairs later.
-        c = active[min(m + _AHEAD, stop - 1)]
-        e = first[c]
-        f = second[c]
-        ask_for(node, e)
-        ask_for(node, f)
-        ask_for(node, min(f + 1, last))
-        ask_for(fn, e)
-        ask_for(fn, f)
-        ask_for(shears, c)
-        ask_for(slips, c)
-        c = active[m]
-        e = first[c]
-        f = second[c]
-        # Difference of the unit tangents: along the common tangent, of length sqrt(2 + 2 facing).
-        tx = node[e, TX] - node[f, TX]
-        ty = node[e, TY] - node[f, TY]
-        facing = 0.5 * (tx * tx + ty * ty) - 1.0
-        if facing <= FACING_NONE:
-            if live[c] == 1:
-                forget(shears, flags, intact, c)
-                live[c] = 0
-            continue
-        f2 = follow[f]
-        ox = node[e, X]
-        oy = node[e, Y]
-        # Along the tangent: edge e runs from 0 to se, edge f from s1 (its end) to s0 (its start).
-        se = node[e, LENGTH] * (node[e, TX] * tx + node[e, TY] * ty)
-        s0 = (node[f, X] - ox) * tx + (node[f, Y] - oy) * ty
-        s1 = (node[f2, X] - ox) * tx + (node[f2, Y] - oy) * ty
-        low = max(0.0, s1)
-        high = min(se, s0)
-        rim = node[e, RIM] + node[f, RIM]
-        # Lengths are still stretched by sqrt(2 + 2 facing), at least sqrt(3).
-        if high - low <= 1.7 * rim:
-            if live[c] == 1:
-                forget(shears, flags, intact, c)
-                live[c] = 0
-            continue
-        # Heights along the normal n = (ty, -tx), which points out of edge e.
-        he = node[e, LENGTH] * (node[e, TX] * ty - node[e, TY] * tx)
-        h0 = (node[f, X] - ox) * ty - (node[f, Y] - oy) * tx
-        h1 = (node[f2, X] - ox) * ty - (node[f2, Y] - oy) * tx
-        apart = min(h0, h1) > max(0.0, he)
-        if apart and intact[c] == 0 and slips[c, 0] == 0.0 and slips[c, 1] == 0.0:
-            # Most chamfers end here, before any root or division.
-            if live[c] == 0 or flags[c, 0] != OPEN or flags[c, 1] != OPEN:
-                forget(shears, flags, intact, c)
-                live[c] = 1
-            continue
-        e2 = follow[e]
-        scale = 1.0 / np.sqrt(2.0 + 2.0 * facing)
-        de = 1.0 / (se * scale)
-        df = 1.0 / ((s0 - s1) * scale)
-        tx *= scale
-        ty *= scale
-        low *= scale
-        high *= scale
-        s0 *= scale
-        s1 *= scale
-        he *= scale
-        h0 *= scale
-        h1 *= scale
-        length = high - low
-        gap0 = h1 + (h0 - h1) * (low - s1) * df - he * low * de
-        gap1 = h1 + (h0 - h1) * (high - s1) * df - he * high * de
-        overlap = -0.5 * (gap0 + gap1)
-        if overlap > deepest:
-            if live[c] == 1:
-                sums[0] += friction_work
-                sums[1] = overlap
-                return c
-            continue
-        live[c] = 1
-        area = 0.5 * _bearing(length, gap0, gap1, rim)
-        if facing < FACING_FULL:
-            area *= (facing - FACING_NONE) / (FACING_FULL - FACING_NONE)
-        fex0 = 0.0
-        fey0 = 0.0
-        fex1 = 0.0
-        fey1 = 0.0
-        ffx0 = 0.0
-        ffy0 = 0.0
-        ffx1 = 0.0
-        ffy1 = 0.0
-        for k in range(2):
-            s = low if k == 0 else high
-            gap = gap0 if k == 0 else gap1
-            slip = slips[c, k]
-            open_by_dilation = dilation * min(abs(slip), limit)
-            closed = open_by_dilation - gap
-            sigma = kn * closed
-            if closure > 0.0 and closed > 0.0:
-                sigma = closure_stress(closed, kn, closure)[0]
-            whole = intact[c] == 1 and flags[c, k] != BROKEN
-            tension = tensile if whole else 0.0
-            if sigma <= -tension:
-                # What the joint stored is lost with it.
-                lost = shears[c, k] * shears[c, k] * compliance
-                if tension > 0.0:
-                    lost += sigma * sigma / kn
-                friction_work += 0.5 * lost * area
-                shears[c, k] = 0.0
-                if flags[c, k] != BROKEN:
-                    flags[c, k] = BROKEN if whole and (tension > 0.0 or weakens) else OPEN
-                continue
-            alpha = s * de
-            beta = (s0 - s) * df
-            vx = (1.0 - beta) * node[f, VX] + beta * node[f2, VX]
-            vx -= (1.0 - alpha) * node[e, VX] + alpha * node[e2, VX]
-            vy = (1.0 - beta) * node[f, VY] + beta * node[f2, VY]
-            vy -= (1.0 - alpha) * node[e, VY] + alpha * node[e2, VY]
-            tau = shears[c, k] + ksdt * (vx * tx + vy * ty)
-            cohesion = peak_cohesion
-            friction = peak_friction
-            if weakens and not whole:
-                cohesion = residual_cohesion
-                friction = residual_friction
-            strength = max(cohesion + sigma * friction, 0.0)
-            flag = STICK
-            if abs(tau) > strength:
-                if weakens and whole:
-                    # It breaks: strength falls at once, and with it what it stored.
-                    strength = max(residual_cohesion + sigma * residual_friction, 0.0)
-                    friction_work += 0.5 * compliance * (abs(tau) - strength) ** 2 * area
-                    flags[c, k] = BROKEN
-                limited = strength if tau > 0.0 else -strength
-                slid = (tau - limited) * compliance
-                slip += slid
-                opened = dilation * min(abs(slip), limit) - open_by_dilation
-                friction_work += (limited * slid - sigma * opened) * area
-                tau = limited
-                slips[c, k] = slip
-                flag = SLIP
-            if flags[c, k] != BROKEN:
-                flags[c, k] = flag
-            shears[c, k] = tau
-            if -gap > largest:
-                largest = -gap
-            # Traction on edge e: -sigma n + tau t, at a point midway between the edges. Seen from a point of
-            # edge e this adds a couple, carried by opposite normal forces at the ends of that edge.
-            forcex = (tau * tx - sigma * ty) * area
-            forcey = (tau * ty + sigma * tx) * area
-            couple = 0.5 * gap * tau * area
-            qe = couple * de
-            qf = -couple * df
-            fex0 += (1.0 - alpha) * forcex + qe * ty
-            fey0 += (1.0 - alpha) * forcey - qe * tx
-            fex1 += alpha * forcex - qe * ty
-            fey1 += alpha * forcey + qe * tx
-            ffx0 -= (1.0 - beta) * forcex - qf * ty
-            ffy0 -= (1.0 - beta) * forcey + qf * tx
-            ffx1 -= beta * forcex + qf * ty
-            ffy1 -= beta * forcey - qf * tx
-        fn[e, 0] += fex0
-        fn[e, 1] += fey0
-        fn[e2, 0] += fex1
-        fn[e2, 1] += fey1
-        if f < node_end:
-            fn[f, 0] += ffx0
-            fn[f, 1] += ffy0
-            fn[f2, 0] += ffx1
-            fn[f2, 1] += ffy1
-        else:
-            row = far_of[c]
-            far[row, 0] = ffx0
-            far[row, 1] = ffy0
-            far[row, 2] = ffx1
-            far[row, 3] = ffy1
-    sums[0] += friction_work
-    sums[1] = largest
-    return -1
 
 
 @kernel(error_model="numpy")
@@ -436,7 +178,7 @@ def contact_state(pairs, follow, node, table, deepest, out, ints, fn):
         gaps = 0.5 * (gap0 + gap1)
         if -gaps > deepest:
             continue
-        area *= _bearing(high - low, gap0, gap1, rim) / (high - low)
+        area *= bearing(high - low, gap0, gap1, rim) / (high - low)
         normal = 0.0
         shear = 0.0
         height = 0.0

@@ -7,23 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from graben.mechanics.blocks import moving, search, zones
+from graben.mechanics.blocks import moving, search, watch, zones
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.bodies import Bodies, Skin, chamfered_skin
-from graben.mechanics.blocks.joints import (
-    COLUMNS,
-    RIM,
-    RIM_SHARE,
-    STICK,
-    TX,
-    TY,
-    Joint,
-    Pairs,
-    contact_state,
-    joint_table,
-    node_motion,
-)
+from graben.mechanics.blocks.joints import RIM_SHARE, STICK, Joint, Pairs, contact_state, joint_table
 from graben.mechanics.blocks.memory import aligned
+from graben.mechanics.blocks.nodes import COLUMNS, RIM, TX, TY, node_motion
 from graben.mechanics.blocks.parts import cut_into_parts
 from graben.mechanics.blocks.plastic_zones import EQUIVALENT, LOST, PlasticZones, Strength, plastic_zones
 from graben.mechanics.blocks.team import run_together, share_out
@@ -150,7 +139,7 @@ class BlockModel:
             np.zeros(6),
             np.zeros(3),
             np.zeros(5),
-            **search.fresh_watch(search.no_pairs(), self.parts, np.zeros((nn, COLUMNS))),
+            **watch.fresh_watch(search.no_pairs(), self.parts, np.zeros((nn, COLUMNS))),
         )
         x, k = bodies.position, self.skin
         point = x[k.first] + k.weight[:, None] * (x[k.second] - x[k.first])
@@ -216,7 +205,7 @@ class BlockModel:
         self.pairs = search.carry_history(keys, len(s.first), self.pairs, self._edge_material, self._set_of)
         if first and any(j.tension > 0.0 or j.weakens for j in self.joints):
             self._bond()
-        self.motion = m._replace(**search.fresh_watch(self.pairs, self.parts, m.node, len(self.joints)))
+        self.motion = m._replace(**watch.fresh_watch(self.pairs, self.parts, m.node, len(self.joints)))
         self.rebuilds += 1
 
     def _bond(self) -> None:
@@ -239,7 +228,7 @@ class BlockModel:
         sums = np.zeros((2, len(self.parts.node) - 1, moving.COLUMNS))
         while left > 0:
             m, s = self.motion, self.skeleton
-            rx.begin(s, m)
+            rx.begin(s, m, self.pairs)
             plan = share_out(self.parts, m.far_start, m.post_start, m.post, threads)
             rest = (
                 left,
@@ -259,6 +248,7 @@ class BlockModel:
             )
             own = [m] + [rx.private(m) for _ in range(1, threads)]
             status, done, where = run_together(rx.advance, [(plan, sums, mine, *rest) for mine in own])
+            rx.end(m, self.pairs)
             left -= done
             self.steps_done += done
             self.time += done * self.dt

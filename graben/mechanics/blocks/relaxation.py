@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from graben.mechanics.blocks.joints import contact_forces, node_motion, scatter_nodes
+from graben.mechanics.blocks.contact import Rows, contact_forces, settle_rows
 from graben.mechanics.blocks.moving import (
     AT_DAMPED,
     AT_DEEP,
@@ -18,8 +18,9 @@ from graben.mechanics.blocks.moving import (
     AT_WALL,
     move_blocks,
 )
-from graben.mechanics.blocks.search import follow_blocks, look_again
+from graben.mechanics.blocks.nodes import node_motion, scatter_nodes
 from graben.mechanics.blocks.team import all_there, arrive
+from graben.mechanics.blocks.watch import follow_blocks, line_up, look_again
 from graben.mechanics.compiled import kernel
 
 DONE, REBUILD, RUNAWAY, DEEP_OVERLAP, LEFT_ALONE = 0, 1, 2, 3, 4
@@ -59,8 +60,8 @@ class Motion(NamedTuple):
 
     x, v, zone_force, joint_force, reaction : (vertices, 2); node : node table (nodes, 8); fn : (nodes, 2)
     From start on, the watch: which candidates are awake, part by part, and when to look at each of them again.
-    start : (parts + 1,) first candidate of each part, that of its first edge; awake ones are listed in active, those
-    of part p and set of joints s from turn[p, s] to turn[p, s + 1]
+    start : (parts + 1,) first candidate of each part, that of its first edge; awake ones have rows (valid while
+    stepping, between `begin` and `end`), those of part p and set of joints s from turn[p, s] to turn[p, s + 1]
     kind : (n,) what a candidate was when last looked at; wake : (n,) path [m] of its blocks at which to look again
     far_start : (parts + 1,), far_of : (n,) row of `far` (rows, 4) through which a pair hands forces on to another
     part, -1 within a part; post_start : (parts + 1,), post : (rows, 2) row and node of the forces handed to each part
@@ -80,7 +81,7 @@ class Motion(NamedTuple):
     sums: np.ndarray
     drive: np.ndarray
     start: np.ndarray
-    active: np.ndarray
+    rows: Rows
     turn: np.ndarray
     kind: np.ndarray
     wake: np.ndarray
@@ -103,7 +104,7 @@ def private(m: Motion) -> Motion:
 
 
 @kernel(error_model="numpy")
-def _press(p, s, m, parts, pairs, joints, deepest, dt, sums):
+def _press(p, m, parts, joints, deepest, dt, sums):
     """Contact forces of the pairs of part p."""
     fn, far = m.fn, m.far
     for i in range(parts.node[p], parts.node[p + 1]):
@@ -118,11 +119,9 @@ def _press(p, s, m, parts, pairs, joints, deepest, dt, sums):
     own[AT_DEEP] = -1.0
     for k in range(m.turn.shape[1] - 1):
         bad = contact_forces(
-            m.active,
+            m.rows,
             m.turn[p, k],
             m.turn[p, k + 1],
-            pairs,
-            s.follow,
             m.node,
             joints,
             k,
@@ -130,7 +129,6 @@ def _press(p, s, m, parts, pairs, joints, deepest, dt, sums):
             dt,
             fn,
             parts.node[p + 1],
-            m.far_of,
             far,
             own,
         )
@@ -162,8 +160,8 @@ def _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums):
 
 
 @kernel(error_model="numpy")
-def begin(s, m):
-    """Before `advance`: node table of the present positions; a look at all is due if somebody moved them since."""
+def begin(s, m, pairs):
+    """Before `advance`: node table and rows of the present state; a look is due if somebody moved nodes since."""
     x, v, node = m.x, m.v, m.node
     first, second, weight = s.first, s.second, s.weight
     for i in range(node.shape[0]):
@@ -172,6 +170,15 @@ def begin(s, m):
             if node[i, d] != x[first[i], d] + w * (x[second[i], d] - x[first[i], d]):
                 m.due[0] = 0
     node_motion(x, v, first, second, weight, s.follow, node, 0, node.shape[0])
+    for p in range(m.turn.shape[0]):
+        line_up(p, pairs, s.follow, m)
+
+
+@kernel(error_model="numpy")
+def end(m, pairs):
+    """After `advance`: what the rows remember goes back to the pairs."""
+    for p in range(m.turn.shape[0]):
+        settle_rows(m.rows, m.turn[p, 0], m.turn[p, -1], pairs)
 
 
 @kernel(error_model="numpy")
@@ -299,14 +306,14 @@ def advance(
         now = sums[step % 2]
         for p in range(first, stop):
             if pushes[p] == 1:
-                _press(p, s, m, parts, pairs, joints, deepest, dt, now)
+                _press(p, m, parts, joints, deepest, dt, now)
         turn += 1
         arrive(board, me, turn)
         # A pair belongs to the lower of its parts: once all parts up to p are pressed, nobody reads the nodes of p
         # but other threads, and these only if they push on it.
         for p in range(first, stop):
             if pushes[p] == 0:
-                _press(p, s, m, parts, pairs, joints, deepest, dt, now)
+                _press(p, m, parts, joints, deepest, dt, now)
             if pushed[p] == 0:
                 _yield_to(p, s, m, parts, load, alpha, local, dt, speed, now)
         if not all_there(board, turn):

@@ -55,6 +55,23 @@ def pair_force(points_e, points_f, velocity_e, velocity_f, shear, slip, joint, d
     return fe, ff, shear, slip
 
 
+def shared_interval(points_e, points_f):
+    """Length that two edges share along their common tangent, 0 if turned away, and the smaller gap at its ends."""
+    te = (points_e[1] - points_e[0]) / np.linalg.norm(points_e[1] - points_e[0])
+    tf = (points_f[1] - points_f[0]) / np.linalg.norm(points_f[1] - points_f[0])
+    if -te @ tf <= FACING_NONE:
+        return 0.0, np.inf
+    t = (te - tf) / np.linalg.norm(te - tf)
+    n = np.array([t[1], -t[0]])
+    low = max(points_e[0] @ t, points_f[1] @ t)
+    high = min(points_e[1] @ t, points_f[0] @ t)
+    line = [
+        np.interp([low, high], *zip(*sorted((p @ t, p @ n) for p in points), strict=True))
+        for points in (points_e, points_f)
+    ]
+    return high - low, (line[1] - line[0]).min()
+
+
 def boxes_meet(points, follow, block, reach):
     """All pairs (e, f), e < f, of edges of different blocks whose boxes, grown by reach / 2, meet."""
     ends = np.stack([points, points[follow]])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from graben.mechanics.blocks import joints
+from graben.mechanics.blocks import contact, joints, nodes
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.joints import BROKEN, OPEN, SLIP, STICK, Joint
 from graben.mechanics.blocks.model import BlockModel, Damping
@@ -40,13 +40,12 @@ class Bench:
         v = np.zeros((4, 2))
         # Edges stay in place along the joint: slip is the integral of their relative velocity.
         v[2:] = step / self.dt
-        node = np.zeros((4, joints.COLUMNS))
-        joints.node_motion(x, v, np.arange(4), np.arange(4), np.zeros(4), FOLLOW, node, 0, 4)
-        force, far, none = np.zeros((4, 2)), np.zeros((1, 4)), np.zeros(1, dtype=np.int64)
-        row = np.zeros(1, dtype=np.int32)
-        bad = joints.contact_forces(
-            none, 0, 1, self.pairs, FOLLOW, node, self.table, 0, 1.0, self.dt, force, 4, row, far, self.sums
-        )
+        node = np.zeros((4, nodes.COLUMNS))
+        nodes.node_motion(x, v, np.arange(4), np.arange(4), np.zeros(4), FOLLOW, node, 0, 4)
+        force, far, rows = np.zeros((4, 2)), np.zeros((1, 4)), contact.empty_rows(1)
+        contact.fill_row(rows, 0, self.pairs, 0, FOLLOW, -1)
+        bad = contact.contact_forces(rows, 0, 1, node, self.table, 0, 1.0, self.dt, force, 4, far, self.sums)
+        contact.settle_rows(rows, 0, 1, self.pairs)
         assert bad == -1
         self.node = node
         return force[:2, 1].sum(), force[:2, 0].sum()
