@@ -97,12 +97,13 @@ class History:
         """Arrays of all saved states, named as in the artifact; contacts are ragged over time."""
         b, rows = self.model.bodies, self.rows
         contact = np.vstack(rows["contact"])
+        zoned = "zone_stress" in rows
         result = {
             "time": np.array(self.time),
             "vertex_position": self.reference,
             "vertex_block": b.vertex_block,
-            "zone_vertex": b.zone_vertex,
-            "zone_block": b.zone_block,
+            "zone_vertex": b.zone_vertex if zoned else b.zone_vertex[:0],
+            "zone_block": b.zone_block if zoned else b.zone_block[:0],
             "block_area": b.block_area,
             "block_corner_count": np.diff(b.block_start),
             "block_corner": b.block_corner,
@@ -126,6 +127,8 @@ class History:
         whole = (*self.model.state_of_blocks(), "boundary_force", "wall_reaction", *self.optional)
         for name in ("displacement", "velocity", *whole):
             result[name] = np.array(rows[name])
+        # Rigid blocks have no zones.
+        result.setdefault("zone_stress", np.zeros((len(self.time), 0, 4)))
         energy = np.array(rows["energy"])
         for k, name in enumerate(ENERGIES):
             # Zones that cannot yield take nothing.

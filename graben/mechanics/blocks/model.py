@@ -12,9 +12,16 @@ from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.bodies import Bodies, Skin, chamfered_skin
 from graben.mechanics.blocks.joints import RIM_SHARE, STICK, Joint, Pairs, contact_state, joint_table
 from graben.mechanics.blocks.memory import aligned
-from graben.mechanics.blocks.nodes import COLUMNS, RIM, TX, TY, node_motion
-from graben.mechanics.blocks.parts import cut_into_parts
+from graben.mechanics.blocks.nodes import COLUMNS, RIM, TX, TY, node_motion, scatter_nodes
+from graben.mechanics.blocks.parts import cut_into_parts, runs
 from graben.mechanics.blocks.plastic_zones import EQUIVALENT, LOST, PlasticZones, Strength, plastic_zones
+from graben.mechanics.blocks.rigid_blocks import (
+    RigidBlocks,
+    block_stress,
+    kinetic_energies,
+    rigid_blocks,
+    stiffest_motion,
+)
 from graben.mechanics.blocks.team import run_together, share_out
 from graben.mechanics.failure import NumericsFailed
 
@@ -46,6 +53,7 @@ class BlockModel:
     more_joints : sets 1, 2, ... beside `joint`, which is set 0; edge_set : (outline edges of the bodies,) set of each
     edge; set_between : (sets, sets) set that holds between edges of two sets, by default the lower of both.
     strength : at which zones yield; None: elastic
+    rigid : blocks do not deform; young, poisson and strength then count for nothing
     threads : more than 1 shares the work out to as many threads, with bitwise the same result.
     """
 
@@ -67,6 +75,7 @@ class BlockModel:
         edge_set: np.ndarray | None = None,
         set_between: np.ndarray | None = None,
         strength: Strength | None = None,
+        rigid: bool = False,
     ) -> None:
         kn = min(j.normal_stiffness for j in (joint, *more_joints))
         for name, value in (("young", young), ("density", density), ("kn", kn)):
@@ -89,13 +98,24 @@ class BlockModel:
         self.true_mass = np.bincount(
             bodies.zone_vertex.ravel(), weights=np.repeat(density * area / 3.0, 3), minlength=nv
         )
-        stiffness = self._vertex_stiffness(gradient, area, lam_z, mu_z)
+        elastic = zones.ElasticZones(bodies.zone_vertex.astype(np.int32), gradient, area, lam_z, mu_z)
+        law: zones.ElasticZones | PlasticZones | RigidBlocks = elastic
+        if rigid:
+            law = rigid_blocks(bodies, density, area, runs(bodies.vertex_block)[1])
+            owner = np.repeat(np.arange(len(law.place)), np.diff(law.first))
+            stiffness = self.true_mass * (self._block_stiffness(law) / law.inertia[:, 0])[owner]
+        else:
+            stiffness = self._vertex_stiffness(gradient, area, lam_z, mu_z)
+        if strength is not None and not rigid:
+            law = plastic_zones(elastic, young, poisson, strength)
         if dt is None:
             self.dt = float(SAFETY * np.sqrt(4.0 * self.true_mass / stiffness).min())
             mass = self.true_mass.copy()
         else:
             self.dt = float(dt)
             mass = stiffness * dt**2 / (4.0 * SAFETY**2)
+            if isinstance(law, RigidBlocks):
+                law.inertia[:, 0] *= (mass / self.true_mass)[law.first[:-1]]
         sets = np.arange(len(self.joints))
         given = np.zeros(len(bodies.edge_from)) if edge_set is None else np.asarray(edge_set)
         between = np.minimum.outer(sets, sets) if set_between is None else np.asarray(set_between)
@@ -109,9 +129,8 @@ class BlockModel:
         self.held = np.zeros((nv, 2), dtype=bool)
         self.weight = self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :]
         self.mass_ratio = mass / self.true_mass
-        elastic = zones.ElasticZones(bodies.zone_vertex.astype(np.int32), gradient, area, lam_z, mu_z)
         self.skeleton = rx.Skeleton(
-            elastic if strength is None else plastic_zones(elastic, young, poisson, strength),
+            law,
             self.skin.first.astype(np.int32),
             self.skin.second.astype(np.int32),
             self.skin.weight,
@@ -178,6 +197,9 @@ class BlockModel:
         np.add.at(total, b.edge_from, k * length)
         np.add.at(total, b.edge_to, k * length)
         return total
+
+    def _block_stiffness(self, blocks: RigidBlocks) -> np.ndarray:
+        return stiffest_motion(self.bodies, blocks, max(max(j.stiffest, j.shear_stiffness) for j in self.joints))
 
     def rebuild(self, first: bool = False) -> None:
         """Find the candidate contacts anew; joints found at the `first` call are intact."""
@@ -346,10 +368,23 @@ class BlockModel:
     def state_of_blocks(self) -> dict[str, np.ndarray]:
         """What the law of the zones leaves at each state, named as in the artifact."""
         z = self.skeleton.zones
+        if isinstance(z, RigidBlocks):
+            return {"block_stress": self.block_stress()}
         state = {"zone_stress": self.zone_stress()}
         if isinstance(z, PlasticZones):
             state |= {"zone_plastic_strain": z.plastic[:, EQUIVALENT].copy(), "zone_state": z.flag.copy()}
         return state
+
+    def block_stress(self) -> np.ndarray:
+        """Mean stress (blocks, 3) of rigid blocks, xx, yy, xy [Pa], from the forces on them."""
+        s, z, b = self.skeleton, self.skeleton.zones, self.bodies
+        nodal, force = np.zeros((len(s.first), 2)), self.boundary_force() + self.weight
+        self.contacts(nodal)
+        scatter_nodes(nodal, s.first, s.second, s.weight, force, 0, len(nodal))
+        number = b.vertex_block[z.first[:-1]]
+        stress = np.empty((len(number), 3))
+        stress[number] = block_stress(z, self.motion.x, force, b.block_area[number])
+        return stress
 
     def _zone_state(self) -> tuple[np.ndarray, float]:
         z = self.skeleton.zones
@@ -377,6 +412,9 @@ class BlockModel:
     def kinetic_energy(self, blocks: np.ndarray) -> float:
         """Kinetic energy [J/m] of the blocks of a mask (blocks,); for instance of all that are not loose."""
         there = blocks[self.bodies.vertex_block]
+        z = self.skeleton.zones
+        if isinstance(z, RigidBlocks):
+            return float(kinetic_energies(z)[there[z.first[:-1]]].sum())
         return float(0.5 * (self.skeleton.mass[there, None] * self.motion.v[there] ** 2).sum())
 
     def calm_loose_blocks(self) -> np.ndarray:
@@ -386,7 +424,10 @@ class BlockModel:
         """
         loose = self.loose_blocks()
         energy = self.kinetic_energy(loose)
-        self.motion.v[loose[self.bodies.vertex_block]] = 0.0
+        there = loose[self.bodies.vertex_block]
+        self.motion.v[there] = 0.0
+        if isinstance(self.skeleton.zones, RigidBlocks):
+            self.skeleton.zones.stop(there)
         self.motion.tally[rx.KINETIC] -= energy
         self.motion.tally[rx.DAMPED] += energy
         return loose
@@ -396,7 +437,7 @@ class BlockModel:
         m, t = self.motion, self.motion.tally
         e = {
             "kinetic": float(t[rx.KINETIC]),
-            "strain": self._zone_state()[1],
+            "strain": 0.0 if isinstance(self.skeleton.zones, RigidBlocks) else self._zone_state()[1],
             "joint": self.contacts()[2],
             "friction": float(m.sums[rx.FRICTION]),
             "plastic": float(m.sums[rx.PLASTIC]),

@@ -10,6 +10,7 @@ from typing import Any
 from numba.extending import overload
 
 from graben.mechanics.blocks.plastic_zones import PlasticZones, plastic_zone_forces
+from graben.mechanics.blocks.rigid_blocks import RigidBlocks, move_rigid_blocks
 from graben.mechanics.blocks.zones import ElasticZones, zone_forces
 from graben.mechanics.compiled import kernel
 
@@ -119,7 +120,20 @@ def _move_plastic(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):
     move_vertices(p, s, m, parts, load, alpha, local, dt, speed, sums)
 
 
-_LAWS = {ElasticZones: _move_elastic, PlasticZones: _move_plastic}
+@kernel(error_model="numpy")
+def _move_rigid(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):
+    begin, stop = parts.block[p], parts.block[p + 1]
+    still, still_end = s.still_start[p], s.still_start[p + 1]
+    kinetic, damped, load_work, wall_work = move_rigid_blocks(
+        zones, begin, stop, still, still_end, s, m, load, alpha, local, dt, speed
+    )
+    sums[p, AT_KINETIC] = kinetic
+    sums[p, AT_DAMPED] = damped
+    sums[p, AT_LOAD] = load_work
+    sums[p, AT_WALL] = wall_work
+
+
+_LAWS = {ElasticZones: _move_elastic, PlasticZones: _move_plastic, RigidBlocks: _move_rigid}
 
 
 def move_blocks(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):

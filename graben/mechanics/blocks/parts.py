@@ -31,7 +31,7 @@ class Parts(NamedTuple):
 
 def cut_into_parts(bodies: Bodies, skin: Skin) -> Parts:
     """Parts of about `PART_BLOCKS` blocks, as stored; one part if vertices, zones and nodes differ in that."""
-    places = [_runs(a) for a in (skin.block, bodies.vertex_block, bodies.zone_block)]
+    places = [runs(a) for a in (skin.block, bodies.vertex_block, bodies.zone_block)]
     blocks = places[0][0]
     same = all(len(p[0]) == len(blocks) and np.array_equal(p[0], blocks) for p in places)
     same &= len(np.unique(blocks)) == len(blocks)
@@ -46,7 +46,7 @@ def cut_into_parts(bodies: Bodies, skin: Skin) -> Parts:
     return Parts(node, vertex, zone, cut, owner)
 
 
-def _runs(block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def runs(block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Blocks in order of storage, and where each begins (one more entry: the end)."""
     start = np.flatnonzero(np.append(True, block[1:] != block[:-1]))
     return block[start], np.append(start, len(block))
