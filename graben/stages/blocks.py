@@ -153,6 +153,7 @@ def _model(scene: BlocksScene, tessellation: Tessellation, dt: float, gravity: t
         damping=_damping(scene, dt),
         threads=scene.numerics.threads,
         strength=Strength(*scene.rock.strength) if scene.rock.zones == "mohr-coulomb" else None,
+        rigid=scene.rock.zones == "rigid",
     )
 
 

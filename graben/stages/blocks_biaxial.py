@@ -85,10 +85,12 @@ class Biaxial:
         size = np.ptp(self.model.bodies.outline, axis=0)
         vertical = push[:, sides.top, 1] / size[0]
         peak = int(np.argmin(vertical))
-        middle = arrays["vertex_position"][arrays["zone_vertex"]].mean(axis=1)
+        bodies, area, stress = self.model.bodies, self.model.zone_area, arrays["zone_stress"]
+        middle = arrays["vertex_position"][bodies.zone_vertex].mean(axis=1)
         inside = np.hypot(*(middle - size / 2.0).T) < 0.4 * size.min()
-        area = self.model.zone_area
-        lateral = mean_stress(arrays["zone_stress"], area, inside if inside.any() else area > 0.0)[:, 0]
+        if "block_stress" in arrays:
+            stress = arrays["block_stress"][:, bodies.zone_block]
+        lateral = mean_stress(stress, area, inside if inside.any() else area > 0.0)[:, 0]
         after = slice(1, peak + 1) if peak > 0 else slice(None)
         applied = arrays.get("confining_stress_then", np.full(len(lateral), arrays["confining_stress"]))
         return {

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from graben.mechanics.blocks.bodies import ear_clip
 from graben.schemas.vtk import VtuSeries
 
 # Of zones that can yield; in the files without "zone_".
@@ -15,11 +16,16 @@ YIELD = ("zone_plastic_strain", "zone_state")
 def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
     """Zones in NAME.pvd, contacts as lines in NAME-joints.pvd, one VTU a state each."""
     reference = arrays["vertex_position"]
+    rigid = "block_stress" in arrays
+    triangles, owner = _triangles(arrays) if rigid else (arrays["zone_vertex"], arrays["zone_block"])
     end = np.concatenate([[0], np.cumsum(arrays["contact_count"])])
     beside = output.with_name(output.stem + "-joints.nc")
     with VtuSeries(output) as zones, VtuSeries(beside) as joints:
         for k, time in enumerate(arrays["time"]):
             stress = arrays["zone_stress"][k]
+            if rigid:
+                # Forces in the plane say nothing about zz: 0 in the file.
+                stress = np.insert(arrays["block_stress"][k], 2, 0.0, axis=1)[owner]
             tensor = np.zeros((len(stress), 6))
             tensor[:, [0, 1, 2, 3]] = stress
             centre = 0.5 * (stress[:, 0] + stress[:, 1])
@@ -27,7 +33,7 @@ def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
             zones.add(
                 time,
                 reference + arrays["displacement"][k],
-                {"triangle": arrays["zone_vertex"]},
+                {"triangle": triangles},
                 {
                     "displacement": arrays["displacement"][k],
                     "velocity": arrays["velocity"][k],
@@ -37,7 +43,7 @@ def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
                     "stress": tensor,
                     "stress_major_compressive": centre - radius,
                     "stress_minor_compressive": centre + radius,
-                    "block": arrays["zone_block"],
+                    "block": owner,
                     **{name[5:]: arrays[name][k] for name in YIELD if name in arrays},
                 },
             )
@@ -61,3 +67,11 @@ def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
                     **sets,
                 },
             )
+
+
+def _triangles(arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (n, 3) that fill blocks without zones, and the block of each (n,)."""
+    ends = np.cumsum(arrays["block_corner_count"])[:-1]
+    rings = np.split(arrays["block_corner"], ends)
+    cut = [ring[ear_clip(arrays["vertex_position"][ring])] for ring in rings]
+    return np.vstack(cut), np.repeat(np.arange(len(rings)), [len(t) for t in cut])

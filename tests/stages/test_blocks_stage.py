@@ -189,6 +189,34 @@ def test_weak_rock_yields(scene, finished):
     assert {"plastic_strain", "state"} <= set(grid.read()[0].cell_data)
 
 
+def test_rigid_blocks_from_scene_to_averages(scene, tmp_path):
+    import pyvista
+
+    from graben.stages import homogenize
+
+    output = tmp_path / "rigid.nc"
+    settings = ['rock.zones="rigid"', 'domain.width="4 m"', 'domain.height="4 m"', "loading.states=3"]
+    run = dem_run.run(scene, output, overrides=settings)
+    assert run["peak_wall_stress_pa"] < -0.5e6
+    assert run["energy_error"] < 0.02
+    d = read_artifact(output, "blocks")
+    assert d.sizes["zone"] == 0
+    assert d.block_stress.dims == ("time", "block", "plane")
+    mean = np.average(d.block_stress[0], axis=0, weights=d.block_area)
+    assert mean[:2] == pytest.approx([-0.5e6, -0.25e6], rel=0.05)
+    grid = pyvista.get_reader(output.with_suffix(".pvd"))
+    grid.set_active_time_value(grid.time_values[-1])
+    cells = grid.read()[0]
+    assert np.unique(cells["block"]).size == d.sizes["block"]
+    picture.run(output, tmp_path / "rigid.png")
+    # The averages of the whole body are what the walls say.
+    homogenize.run([output], tmp_path / "curves.nc", radii=[1.5])
+    curves = read_artifact(tmp_path / "curves.nc", "curves")
+    assert "forces" in curves.attrs["stress_from"]
+    assert curves.stress[0, 0, [0, 1]].values == pytest.approx([-0.5e6, -0.25e6], rel=0.1)
+    assert float(curves.strain[0, -1, 1]) == pytest.approx(-0.0002 * 100 / 4, rel=0.3)
+
+
 def test_threads_change_nothing(scene, finished):
     output = scene.with_name("threads.nc")
     dem_run.run(scene, output, overrides=["output.vtk=false", "numerics.threads=2"])
@@ -222,6 +250,8 @@ def test_failed_run_keeps_its_last_states(scene):
         ("loading.sped=1", "loading.sped"),
         ('rock.zones="plastic"', "rock.zones"),
         ('rock.cohesion="1 MPa"', "cohesion"),
+        ('rock={zones="mohr-coulomb",friction="20 deg",dilation="21 deg"}', "dilation"),
+        ('rock={zones="rigid",tension="1 MPa"}', "tension"),
     ],
 )
 def test_bad_scenes_are_refused(scene, setting, key):

@@ -23,7 +23,7 @@ LAYOUT = Layout(
     dims={
         "time": "saved states; the first is the start of loading, after consolidation",
         "vertex": "grid points; each block owns its own",
-        "zone": "constant-strain triangles, counter-clockwise",
+        "zone": "constant-strain triangles, counter-clockwise; rigid blocks have none",
         "zone_corner": "the three vertices of a zone",
         "block": "blocks",
         "corner": "corners of all blocks, block by block, counter-clockwise",
@@ -34,6 +34,7 @@ LAYOUT = Layout(
         "look": "moments at which rising pressures were looked at",
         "surface": "vertices of the free and loaded outline, along it",
         "component": "xx, yy, zz, xy",
+        "plane": "xx, yy, xy",
     },
     variables={
         "time": Variable(_T, "s", "time since the first state"),
@@ -47,6 +48,12 @@ LAYOUT = Layout(
         "displacement": Variable(("time", "vertex", "axis"), "m", "displacement since the first state"),
         "velocity": Variable(("time", "vertex", "axis"), "m s-1", "velocity"),
         "zone_stress": Variable(("time", "zone", "component"), "Pa", "Cauchy stress, tension positive"),
+        "block_stress": Variable(
+            ("time", "block", "plane"),
+            "Pa",
+            "mean Cauchy stress of rigid blocks, from the forces on them",
+            optional=True,
+        ),
         "zone_plastic_strain": Variable(
             ("time", "zone"), "1", "equivalent plastic strain, sum of sqrt(2/3 de:de)", optional=True
         ),

@@ -79,11 +79,12 @@ class Tessellation(Model):
 class Rock(Model):
     """The blocks themselves, in plane strain; strengths left out are those of Y's granite in UDEC."""
 
-    zones: Literal["elastic", "mohr-coulomb"] = key(
-        "elastic", "elastic: zones deform; mohr-coulomb: they also yield, in shear and in tension"
+    zones: Literal["elastic", "mohr-coulomb", "rigid"] = key(
+        "elastic",
+        "elastic: zones deform; mohr-coulomb: they also yield, in shear and in tension; rigid: blocks without zones",
     )
-    young: Pressure = key("65 GPa", "Young's modulus", gt=0)
-    poisson: float = key(0.2, "Poisson's ratio", gt=-1, lt=0.5)
+    young: Pressure = key("65 GPa", "Young's modulus (rigid blocks have none)", gt=0)
+    poisson: float = key(0.2, "Poisson's ratio (rigid blocks have none)", gt=-1, lt=0.5)
     density: Density = key("2700 kg/m^3", "density", gt=0)
     friction: Angle | None = key(None, "mohr-coulomb: friction angle; left out: 51 deg", ge=0, le=1.396)
     cohesion: Pressure | None = key(None, "mohr-coulomb: cohesion; left out: 55.1 MPa", ge=0)
@@ -202,6 +203,10 @@ class BlocksScene(Scene):
             faults.append(f"one entry of [[joints.sets]] for each set (found sets {numbers})")
         elif numbers and t.method == "joint-sets" and max(numbers) > len(t.sets):
             faults.append(f"joints.sets of the {len(t.sets)} sets in [[tessellation.sets]] (found {max(numbers)})")
+        if self.rock.zones == "rigid" and t.zone_edge is not None:
+            faults.append('no tessellation.zone_edge, because rock.zones = "rigid"')
+        if self.rock.zones == "rigid" and self.output.balance:
+            faults.append('no output.balance, because rock.zones = "rigid" (stress comes from the forces)')
         if t.rounding > 0.25 * t.edge:
             faults.append(f"tessellation.rounding of at most a quarter of the edge (found {t.rounding:.4g} m)")
         if t.shortest_edge is not None and t.shortest_edge > t.edge:

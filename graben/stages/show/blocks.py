@@ -13,12 +13,14 @@ def draw(dataset: Any, figure: Any) -> None:
 
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
     x = dataset.vertex_position.values + dataset.displacement.values[-1]
-    stress = -dataset.zone_stress.values[-1, :, 1] / 1e6
-    field = PolyCollection(x[dataset.zone_vertex.values], array=stress, cmap="viridis", edgecolors="none")
-    field.set_clim(0.0, max(float(np.percentile(stress, 97)), 1e-6))
-    left.add_collection(field)
     ends = np.cumsum(dataset.block_corner_count.values)[:-1]
     rings = np.split(x[dataset.block_corner.values], ends)
+    rigid = "block_stress" in dataset
+    stress = -(dataset.block_stress if rigid else dataset.zone_stress).values[-1, :, 1] / 1e6
+    cells = rings if rigid else x[dataset.zone_vertex.values]
+    field = PolyCollection(cells, array=stress, cmap="viridis", edgecolors="none")
+    field.set_clim(0.0, max(float(np.percentile(stress, 97)), 1e-6))
+    left.add_collection(field)
     left.add_collection(PolyCollection(rings, facecolors="none", edgecolors="0.15", linewidths=0.4))
     count = dataset.contact_count.values
     last = slice(int(count[:-1].sum()), int(count.sum()))
@@ -64,14 +66,20 @@ def _compression(dataset: Any, right: Any) -> None:
     held = np.abs(dataset.vertex_position.values[:, 1] - outline[:, 1].max()) < 1e-3 * size[1]
     strain = -dataset.displacement.values[:, held, 1].mean(axis=1) / size[1] * 100.0
     right.plot(strain, -dataset.wall_reaction.values[:, top, 1] / size[0] / 1e6, label="top wall")
-    p = dataset.vertex_position.values[dataset.zone_vertex.values]
-    d1, d2 = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    area = 0.5 * (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0])
-    inside = np.hypot(*(p.mean(axis=1) - outline.mean(axis=0)).T) < 0.4 * size.min()
+    x = dataset.vertex_position.values
+    if "block_stress" in dataset:
+        ends = np.cumsum(dataset.block_corner_count.values)[:-1]
+        middle = np.array([ring.mean(axis=0) for ring in np.split(x[dataset.block_corner.values], ends)])
+        name, area, stress = "blocks", dataset.block_area.values, dataset.block_stress.values
+    else:
+        p = x[dataset.zone_vertex.values]
+        middle, d1, d2 = p.mean(axis=1), p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+        name, area, stress = "zones", 0.5 * (d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]), dataset.zone_stress.values
+    inside = np.hypot(*(middle - outline.mean(axis=0)).T) < 0.4 * size.min()
     if inside.any():
-        mean = np.average(dataset.zone_stress.values[:, inside], axis=1, weights=area[inside])
-        right.plot(strain, -mean[:, 1] / 1e6, label="zones inside, vertical")
-        right.plot(strain, -mean[:, 0] / 1e6, label="zones inside, lateral")
+        mean = np.average(stress[:, inside], axis=1, weights=area[inside])
+        right.plot(strain, -mean[:, 1] / 1e6, label=f"{name} inside, vertical")
+        right.plot(strain, -mean[:, 0] / 1e6, label=f"{name} inside, lateral")
     right.axhline(-float(dataset.confining_stress) / 1e6, color="0.6", ls=":", label="confinement")
     right.set_xlabel("nominal axial strain, %")
     right.set_ylabel("compression, MPa")
