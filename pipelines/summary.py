@@ -17,6 +17,8 @@ ROWS = [
     ("fit to our blocks, RMSE of vertical stress", "MPa", 1e6, "upscaling", "calibration", "rmse_pa"),
     ("fit to UDEC's curves, RMSE of vertical stress", "MPa", 1e6, "upscaling", "calibration-udec", "rmse_pa"),
     ("slope, failure load (law from our blocks)", "MPa", 1e6, "upscaling", "slope", "failure_load_pa"),
+    ("slope, lowest failure load in the band", "MPa", 1e6, "upscaling", "slope-band", "failure_load_low_pa"),
+    ("slope, highest failure load in the band", "MPa", 1e6, "upscaling", "slope-band", "failure_load_high_pa"),
     ("scratch, groove area", "um2", 1e-12, "wear", "scratch", "groove_area_m2"),
     ("scratch, degree of wear", "1", 1.0, "wear", "scratch", "degree_of_wear"),
     ("scratch, path over contact half-width s/a", "1", 1.0, "wear", "scratch", "s_over_a"),

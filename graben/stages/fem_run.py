@@ -166,7 +166,7 @@ def _problem(scene: FemScene, mesh: QuadMesh, law: Material) -> Problem:
             unit, length, rate, offset = force, covered, load.rate, load.pressure
     if faults:
         raise BadInput(faults)
-    body = make_body(mesh, [law], fixed.ravel())
+    body = make_body(mesh, [law], fixed.ravel(), least_length=scene.softening_width)
     return Problem(body, support_nodes, steady, rising, unit, length, rate, offset)
 
 
@@ -246,7 +246,7 @@ def _cost(body: Body, settled: March, loaded: March, headline: dict[str, Any]) -
     return {
         "elements": len(body.mesh.quads),
         "degrees_of_freedom": len(body.free),
-        "smallest_element_m": float(body.elements.length.min()),
+        "smallest_element_m": float(np.sqrt(body.elements.weight.sum(axis=1).min())),
         "steps": len(settled.iterations) + len(loaded.iterations),
         "rejected_steps": settled.rejected + loaded.rejected,
         "factorisations": settled.factorisations + loaded.factorisations,

@@ -3,7 +3,8 @@
 
 UP           := $(RESULTS)/upscaling
 UP_SCENES    := pipelines/upscaling
-CONFINING    ?= 0.5 1 2 4
+# 0.1 MPa for the ground near a surface; the first one is the confinement of the REV study.
+CONFINING    ?= 0.5 1 2 4 0.1
 UP_RADIUS    ?= 4 m
 UP_RUNS      := $(CONFINING:%=$(UP)/blocks-%MPa.nc)
 UP_CURVES    := $(CONFINING:%=$(UP)/curves-%MPa.nc)
@@ -53,8 +54,11 @@ $(UP)/calibration-udec.nc: $(UP_SCENES)/calibrate-udec.toml $(UP_SCENES)/referen
 $(UP)/slope.nc: $(UP_SCENES)/slope.toml $(UP)/calibration.nc
 	$(call stage,fem-run $< --material $(UP)/calibration.material.toml --set fidelity=$(FIDELITY))
 
+$(UP)/slope-band.json: $(UP_SCENES)/slope_band.py $(UP)/slope.nc
+	$(BIN)/python $< $(UP)/calibration.nc $(UP_SCENES)/slope.toml --own $(UP)/slope.json --fidelity $(FIDELITY) -o $@
+
 $(UP)/%.png: $(UP)/%.nc
 	$(BIN)/graben show $< -o $@ --overwrite -q
 
-$(UP)/summary.json: $(UP_ARTIFACTS) pipelines/summary.py
+$(UP)/summary.json: $(UP_ARTIFACTS) $(UP)/slope-band.json pipelines/summary.py
 	$(BIN)/python pipelines/summary.py write upscaling $(@D)

@@ -300,3 +300,31 @@ def test_the_picture_is_drawn(made):
 
     picture.run(made / "run.nc", made / "run.png")
     assert (made / "run.png").stat().st_size > 20_000
+
+
+def test_a_softening_width_slows_or_speeds_damage_as_the_failure_displacement_does(tmp_path):
+    # Elements of 0.5 m that soften as zones of 2 m: damage grows four times as fast, Y (2.34).
+    softens = """damage = "ductile"
+initiation_strain_050 = 1e-3
+initiation_strain_060 = 1e-3
+failure_displacement = """
+    base = SCENE.replace('initial_yield = "1 MPa"\n', 'initial_yield = "1 MPa"\n' + softens + '"FAIL m"\n')
+    wide = base.replace("FAIL", "0.08").replace('kind = "fem"', 'kind = "fem"\nsoftening_width = "2 m"')
+    loads = {}
+    for name, text in (
+        ("wide", wide),
+        ("quick", base.replace("FAIL", "0.02")),
+        ("slow", base.replace("FAIL", "0.08")),
+    ):
+        result = invoke(tmp_path, "--json", text=text, name=name)
+        assert result.exit_code == 0, result.output
+        loads[name] = json.loads(result.stdout)["failure_load_pa"]
+    assert loads["wide"] == pytest.approx(loads["quick"], rel=1e-6)
+    assert loads["wide"] < 0.99 * loads["slow"]
+
+
+def test_a_negative_softening_width_is_refused(tmp_path):
+    text = SCENE.replace('kind = "fem"', 'kind = "fem"\nsoftening_width = "-1 m"')
+    result = invoke(tmp_path, text=text)
+    assert result.exit_code == 2
+    assert "softening_width" in result.output

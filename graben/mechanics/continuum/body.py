@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -127,6 +127,7 @@ def make_body(
     fixed: np.ndarray,
     material_row: np.ndarray | None = None,
     mean_dilatation: bool = True,
+    least_length: float = 0.0,
 ) -> Body:
     """Set up a body.
 
@@ -137,6 +138,7 @@ def make_body(
     fixed : (2 n,) bool, True where the displacement is prescribed
     material_row : (e,) index into `materials`; None: the first everywhere
     mean_dilatation : B-bar on (default) or off
+    least_length : characteristic length, m, that the law gets where elements are smaller
     """
     size = 2 * len(mesh.points)
     fixed = np.asarray(fixed)
@@ -147,6 +149,7 @@ def make_body(
     if rows.shape != (len(mesh.quads),) or rows.min() < 0 or rows.max() >= len(materials):
         raise ValueError(f"material_row must name one of {len(materials)} materials for each element")
     elements = quad_elements(mesh, mean_dilatation)
+    elements = replace(elements, length=np.maximum(elements.length, least_length))
     pattern = pattern_of(elements.dofs, size)
     fixed_dofs, free_dofs = np.flatnonzero(fixed), np.flatnonzero(~fixed)
     if not len(free_dofs):

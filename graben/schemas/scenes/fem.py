@@ -179,6 +179,12 @@ class FemScene(Scene):
     kind: Literal["fem"]
     mesh: Mesh = key(Mesh(), "the mesh")
     material: MaterialTable = key(_ROCK_MASS, "constitutive law and its parameters, or a file that holds them")
+    softening_width: Length = key(
+        "0 m",
+        "width of the zones in which the ground softens together: the characteristic length that the law gets where "
+        "elements are smaller. 0 m: each element softens by itself, with its own size",
+        ge=0,
+    )
     gravity: Gravity = key(Gravity(), "weight")
     supports: list[Support] = key(
         _SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)", min_length=1
