@@ -1,12 +1,16 @@
-"""Blocks against closed forms: waves, joints that pass them, jointed moduli, a joint's cycle and strength."""
+"""Blocks against closed forms: waves, joints that pass them, jointed moduli, a joint's cycle."""
 
 import numpy as np
 import pytest
 
+from graben.mechanics.averaging.network import build_network
+from graben.mechanics.averaging.outline import find_outline
+from graben.mechanics.averaging.rev import Circle
+from graben.mechanics.averaging.strain import outline_gradient
 from graben.mechanics.blocks.bodies import Bodies, build_bodies
 from graben.mechanics.blocks.joints import Joint
 from graben.mechanics.blocks.model import BlockModel, Damping
-from graben.mechanics.blocks.tessellation import from_polygons
+from graben.mechanics.blocks.tessellation import from_polygons, voronoi_blocks
 
 E, NU, RHO = 65e9, 0.2, 2700.0
 GLUED = Joint(1e12, 1e12, 0.0, 1e12, 1e12, 0.0, np.inf)
@@ -225,41 +229,42 @@ def test_dilation_opens_by_its_angle():
     assert model.motion.x[over, 1].mean() - y0 == pytest.approx(slid * np.tan(np.radians(5)), rel=0.03)
 
 
-@pytest.mark.verify
-@pytest.mark.parametrize("dip", [40.0, 50.0, 61.0, 70.0])
-def test_strength_of_rock_with_one_inclined_joint(dip):
-    # Jaeger: s1 = s3 + 2 (c + s3 tan phi) / ((1 - tan phi / tan dip) sin 2 dip).
-    phi, cohesion, s3 = np.radians(30), 0.2e6, 1e6
-    beta = np.radians(dip)
-    w, h = 1.0, 3.0
-    rise = 0.5 * w * np.tan(beta)
-    lower = np.array([(0, 0), (w, 0), (w, h / 2 + rise), (0, h / 2 - rise)])
-    upper = np.array([(0, h / 2 - rise), (w, h / 2 + rise), (w, h), (0, h)])
-    bodies = build_bodies(from_polygons([lower, upper], np.array([(0, 0), (w, 0), (w, h), (0, h)])), 0.5)
-    rounding = 1e-3
-    model = BlockModel(
-        bodies,
-        young=E,
-        poisson=NU,
-        density=RHO,
-        joint=Joint(1e11, 1e11, np.tan(phi), cohesion, 0.0, 0.0, np.inf),
-        rounding=rounding,
-        dt=1e-3,
-        damping=Damping(ratio=1.0),
-    )
-    bottom, top = bodies.vertex_side[:, 0], bodies.vertex_side[:, 2]
-    model.hold(bottom, 1)
-    model.hold(bottom, 0)
-    for side in (1, 3):
-        model.press(bodies.edge_side == side, -s3)
-    model.press(bodies.edge_side == 2, -s3)
-    model.advance(4000)
-    model.skeleton.steady[top, 1] = 0.0
-    model.hold(top, 1, -1e-4)
-    model.motion.drive[3] = 1.0
-    strongest = 0.0
-    for _ in range(60):
-        model.advance(500)
-        strongest = min(strongest, model.motion.reaction[top, 1].sum() / w)
-    expected = s3 + 2 * (cohesion + s3 * np.tan(phi)) / ((1 - np.tan(phi) / np.tan(beta)) * np.sin(2 * beta))
-    assert -strongest == pytest.approx(expected, rel=0.03)
+def voronoi_model():
+    bodies = build_bodies(voronoi_blocks(4.0 * np.array([(0, 0), (1, 0), (1, 1), (0, 1.0)]), 0.5, seed=4))
+    joint = Joint(1e10, 1e9, 0.6, 1e5, 0.0, 0.0, np.inf)
+    return BlockModel(bodies, young=E, poisson=NU, density=RHO, joint=joint, rounding=0.05, dt=1e-2)
+
+
+@pytest.mark.parametrize("radius", [0.6, 1.1, 1.7])
+def test_voronoi_patch_under_an_affine_field_is_exact(radius):
+    model = voronoi_model()
+    b, gradient = model.bodies, np.array([[2e-3, 1e-3], [-4e-4, -3e-3]])
+    f = np.eye(2) + gradient
+    model.motion.x[:] = b.position @ f.T + [1.0, -2.0]
+    # Green's strain, second Piola-Kirchhoff stress, Cauchy stress: the same in every zone.
+    strain = 0.5 * (f.T @ f - np.eye(2))
+    lam, mu = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))
+    s = f @ (lam * np.trace(strain) * np.eye(2) + 2 * mu * strain) @ f.T / np.linalg.det(f)
+    expected = [s[0, 0], s[1, 1], lam * np.trace(strain) / np.linalg.det(f), s[0, 1]]
+    stress = model.zone_stress()
+    assert stress == pytest.approx(np.tile(expected, (len(stress), 1)), abs=1e-12 * E)
+    counts = np.diff(b.block_start)
+    network = build_network(b.position, len(counts), b.zone_vertex, b.zone_block, counts, b.block_corner)
+    outline = find_outline(network, Circle((2.0, 2.0), radius))
+    found = outline_gradient(outline.follow(b.position), outline.follow(model.motion.x - b.position))
+    assert found == pytest.approx(gradient, abs=1e-14)
+
+
+def test_rotation_of_all_blocks_loads_neither_zones_nor_joints():
+    model = voronoi_model()
+    for angle in (0.3, 2.0):
+        c, s = np.cos(angle), np.sin(angle)
+        model.motion.x[:] = model.bodies.position @ np.array([[c, s], [-s, c]])
+        model.motion.v[:] = 0.0
+        model.advance(1)
+        assert np.abs(model.zone_stress()).max() < 1e-12 * E
+        out, _, stored = model.contacts()
+        assert len(out) > 100
+        # Overlaps of some 1e-15 m.
+        assert np.abs(model.motion.joint_force).max() < 1e-13 * model.joint.normal_stiffness
+        assert stored < 1e-12

@@ -56,7 +56,7 @@ def mend(
     outline = outer_boundary(points, rings)
     blocks = from_rings(points, rings, outline, marks)
     if shortest > 0.0:
-        blocks = collapse_short_edges(blocks, shortest)
+        blocks = collapse_short_edges(blocks, shortest, given=True)
     turning = [_turning(blocks.points, ring) for ring in blocks.rings]
     marks = blocks.marks
     if marks is not None:

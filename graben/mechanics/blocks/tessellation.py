@@ -235,12 +235,14 @@ def from_rings(
     return Tessellation(np.ascontiguousarray(points[used]), start, corner, outline, sets)
 
 
-def collapse_short_edges(tessellation: Tessellation, shortest: float) -> Tessellation:
+def collapse_short_edges(tessellation: Tessellation, shortest: float, given: bool = False) -> Tessellation:
     """Collapse edges below `shortest` [m], the shortest first, wherever all blocks around stay sound.
 
     The ends of an inner edge meet in its middle; an end on the outline stays on it, a corner of the outline
     stays put. An edge stays if a block around it would lose its third corner, or get a corner that turns inwards or
     is a needle, or if its ends lie on different sides. The other edges keep their sets of joints.
+    given : the blocks did not come from a Voronoi diagram. They may have such corners from the start: a collapse must
+    not add to them; and the ends may meet at one of them.
     """
     points = tessellation.points.copy()
     outline = tessellation.outline
@@ -269,18 +271,24 @@ def collapse_short_edges(tessellation: Tessellation, shortest: float) -> Tessell
         if stale or not _joined(rings, blocks_at, i, j):
             continue
         if sides[i] == sides[j] and len(sides[i]) < 2:
-            target = 0.5 * (points[i] + points[j])
+            targets = [0.5 * (points[i] + points[j])]
+            if given:
+                targets += [points[i].copy(), points[j].copy()]
         elif sides[i] > sides[j]:
-            target = points[i]
+            targets = [points[i].copy()]
         elif sides[i] < sides[j]:
-            target = points[j]
+            targets = [points[j].copy()]
         else:
             continue
         around = sorted(blocks_at[i] | blocks_at[j])
         before = points[i].copy(), points[j].copy()
+        most = {b: _bad_corners(points, rings[b], sides) if given else 0.0 for b in around}
         changed = {b: _without_repeats([i if p == j else p for p in rings[b]]) for b in around}
-        points[i] = points[j] = target
-        if not all(_sound(points, ring, sides) for ring in changed.values()):
+        for target in targets:
+            points[i] = points[j] = target
+            if all(_bad_corners(points, ring, sides) <= most[b] for b, ring in changed.items()):
+                break
+        else:
             points[i], points[j] = before
             continue
         alive[j] = False
@@ -309,19 +317,16 @@ def _joined(rings, blocks_at, i: int, j: int) -> bool:
     return False
 
 
-def _sound(points: np.ndarray, ring: list[int], sides) -> bool:
-    """At least three corners, none turned inwards (corners of the outline aside), none a needle."""
+def _bad_corners(points: np.ndarray, ring: list[int], sides) -> float:
+    """How many corners turn inwards (corners of the outline aside) or are needles; infinite where it is no block."""
     if len(ring) < 3 or len(set(ring)) < len(ring):
-        return False
+        return np.inf
     xy = points[ring]
     before = xy - np.roll(xy, 1, axis=0)
     after = np.roll(before, -1, axis=0)
     length = np.hypot(before[:, 0], before[:, 1]) * np.hypot(after[:, 0], after[:, 1])
     sine = (before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) / length
     cosine = (before * after).sum(axis=1) / length
-    for k, p in enumerate(ring):
-        if len(sides[p]) >= 2:
-            continue
-        if sine[k] < -_REFLEX_SINE or (cosine[k] < 0.0 and sine[k] < _NEEDLE_SINE):
-            return False
-    return polygons.signed_area(xy) > 0.0
+    bad = (sine < -_REFLEX_SINE) | ((cosine < 0.0) & (sine < _NEEDLE_SINE))
+    bad &= np.array([len(sides[p]) < 2 for p in ring])
+    return float(bad.sum()) if polygons.signed_area(xy) > 0.0 else np.inf

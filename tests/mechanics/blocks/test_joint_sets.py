@@ -7,6 +7,7 @@ from graben.mechanics.blocks import polygons
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets, split
 from graben.mechanics.blocks.mending import mend
+from graben.mechanics.blocks.tessellation import edges_of
 
 SLOPE = np.array([(0, 0), (8, 0), (8, 5), (4, 5), (3, 2), (0, 2)], dtype=float)
 COMB = np.array(
@@ -64,6 +65,10 @@ def test_scattered_sets_are_mended_into_sound_blocks(seed):
     assert found.sum() == pytest.approx(polygons.signed_area(SLOPE), rel=1e-6)
     assert found.min() > 0.015 * np.median([polygons.signed_area(s) for s in shapes])
     assert blocks.size > 20
+    # Short edges go, at the outline too, but where a block would get a corner turned inwards or a needle.
+    short = [np.hypot(*(blocks.points[a] - blocks.points[b])) for ring in blocks.rings for a, b in edges_of(ring)]
+    assert np.sum(np.array(short) < 0.15) <= 3
+    assert min(short) > 0.05
     # Every edge inside knows its set, and those long enough to have a direction run along its joints.
     bodies = build_bodies(blocks, 0.5)
     edge = bodies.position[bodies.edge_to] - bodies.position[bodies.edge_from]
