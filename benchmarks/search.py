@@ -3,12 +3,19 @@
 The model is Drucker-Prager with damage on the UDEC reference curves. `overhead_fraction` is the CPU time that a
 search spends outside of the model, refinement included. Options: --seeds N (3), --particles N (24), --generations N
 (60), --increments N between two points (2, as in standard fidelity; 1, as in draft, is the cheapest model there is).
+
+`--scaling` measures only what a second thread or process gives: swarm and refinement by threads, the asynchronous
+swarm by processes, one and two in turn for --rounds N (5), best of each; `ratio` is the one over the other, with the
+machine's load at the end. Wall times: run it on a quiet machine. `ratio_by_cpu` = 2 / (1 + serial share) is what CPU
+times alone promise: serial is what the calling thread spends outside of the paths (threads), or to hand out and take
+in tasks beside two busy processes. It needs no quiet machine.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import platform
 import time
 from dataclasses import replace
@@ -22,7 +29,7 @@ from graben.mechanics.search.choices import METHODS, explore
 from graben.mechanics.search.multistart import search, sum_of_squares
 from graben.schemas.scene import load_scene
 from graben.stages.calibrate_problem import problem_of
-from graben.stages.calibrate_workers import workers_of
+from graben.stages.calibrate_workers import Sent, workers_of
 from graben.stages.measured import Reading, read_measured
 
 SCENE = Path(__file__).parents[1] / "pipelines/upscaling/calibrate-udec.toml"
@@ -38,7 +45,12 @@ def main() -> None:
     parser.add_argument("--particles", type=int, default=24)
     parser.add_argument("--generations", type=int, default=60)
     parser.add_argument("--increments", type=int, default=2)
+    parser.add_argument("--scaling", action="store_true")
+    parser.add_argument("--rounds", type=int, default=5)
     options = parser.parse_args()
+    if options.scaling:
+        scaling(options)
+        return
     scene = load_scene(SCENE, "calibrate", ["fidelity=draft", f"increments={options.increments}"])
     problem = problem_of(scene, SCENE, "udec")
     objective = problem.objective(read_measured(scene.curves, Reading()))
@@ -72,22 +84,59 @@ def main() -> None:
             rmse_mpa_worst=float(rmse.max()) / 1e6,
         )  # fmt: skip
 
-    plan = replace(problem.plan, method="appso", starts=1, **budget)
-    for count in (1, 2):
-        with workers_of("appso", count, plan.particles, None) as workers:
-            points = np.full((2, problem.box.size), 0.5)
-            if workers.executor is not None:  # workers started, kernels loaded
-                list(workers.executor.map(objective, [points] * 4 * count))
-            begun = time.perf_counter()
-            explore(
-                partial(sum_of_squares, objective),
-                problem.box.size,
-                plan,
-                seed=0,
-                executor=workers.executor,
-                chunk=workers.chunk,
-            )
-            tell("asynchronous swarm alone, by processes", processes=count, wall_s=time.perf_counter() - begun)
+
+def scaling(options: argparse.Namespace) -> None:
+    scene = load_scene(SCENE, "calibrate", ["fidelity=draft", f"increments={options.increments}"])
+    curves = read_measured(scene.curves, Reading())
+    single = problem_of(scene, SCENE, "udec")
+    size = single.box.size
+    budget = {"particles": options.particles, "generations": options.generations, "starts": 1}
+    objectives = {n: problem_of(scene, SCENE, "udec", threads=n).objective(curves) for n in (1, 2)}
+    for objective in objectives.values():
+        objective(np.full((4, size), 0.5))  # compiled, threads started
+    walls: dict[tuple[str, int], list[float]] = {}
+    shares: dict[str, list[float]] = {}
+    inside = 0.0
+    predict = objectives[1].fit.predict
+
+    def timed(*arguments: Any) -> Any:
+        nonlocal inside
+        begun = time.thread_time()
+        found = predict(*arguments)
+        inside += time.thread_time() - begun
+        return found
+
+    with workers_of("appso", 2, options.particles, None) as workers:
+        assert workers.executor is not None
+        sent = Sent(objectives[1])
+        list(workers.executor.map(sent, [np.full((2, size), 0.5)] * 8))  # workers started, kernels loaded
+        alone = 0.0
+        for _ in range(options.rounds):
+            for n in (1, 2):
+                begun = time.perf_counter()
+                search(objectives[n], size, replace(single.plan, method="swarm", **budget))
+                walls.setdefault(("threads, swarm and refinement", n), []).append(time.perf_counter() - begun)
+                begun, spent = time.perf_counter(), time.process_time()
+                explore(
+                    partial(sum_of_squares, sent), size, replace(single.plan, method="appso", **budget),
+                    seed=0, executor=workers.executor if n == 2 else None, chunk=workers.chunk,
+                )  # fmt: skip
+                walls.setdefault(("processes, asynchronous swarm", n), []).append(time.perf_counter() - begun)
+                spent = time.process_time() - spent
+                alone = spent if n == 1 else alone
+            shares.setdefault("processes, asynchronous swarm", []).append(spent / alone)
+    objectives[1].fit.predict = timed  # type: ignore[method-assign]
+    for _ in range(options.rounds):
+        inside, begun = 0.0, time.thread_time()
+        search(objectives[1], size, replace(single.plan, method="swarm", **budget))
+        shares.setdefault("threads, swarm and refinement", []).append(1.0 - inside / (time.thread_time() - begun))
+    for what in dict.fromkeys(name for name, _ in walls):
+        one, two = min(walls[what, 1]), min(walls[what, 2])
+        serial = float(np.median(shares[what]))
+        tell(
+            f"two {what}", wall_1_s=one, wall_2_s=two, ratio=one / two, ratio_by_cpu=2.0 / (1.0 + serial),
+            load=os.getloadavg()[0], rounds=options.rounds,
+        )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from graben.mechanics.materials.laws import LAWS
+from graben.mechanics.search.first_state import settle
 from graben.mechanics.search.identifiability import identify
 from graben.schemas.artifact import write_artifact
 from graben.schemas.faults import BadInput, Fault
@@ -86,8 +87,10 @@ def run(
         objective, found = problem.solve(
             measured, problem.plan, state, "all curves", lambda part, words: progress(share * part, words)
         )
-        fit = objective.fit
-        values = fit.used(problem.box.to_values(found.best.x))
+        settled = settle(objective, found.best)
+        fit, best = objective.fit, settled.best
+        evaluations = found.evaluations + best.evaluations - found.best.evaluations
+        values = fit.used(problem.box.to_values(best.x))
         errors = fit.errors(values)
         holdout, candidates = None, []
         if folds:
@@ -100,19 +103,18 @@ def run(
                 others, measured, state, lambda part, words: progress(share * 2 + (0.95 - 2 * share) * part, words)
             )
             candidates = [first, *rest]
-    best = found.best
     known = identify(
-        best.x, objective.data(best.x[None])[0], best.jacobian[: fit.groups.size], groups=fit.groups,
-        lag=scene.correlation_length, precision=problem.priors.precision(problem.box.size),
+        best.x, best.residuals[: fit.groups.size], best.jacobian[: fit.groups.size], groups=fit.groups,
+        lag=scene.correlation_length, precision=problem.priors.precision(problem.box.size), beside=settled.moved,
     )  # fmt: skip
-    near = found.member_values <= _NEAR * best.value
+    near = found.member_values <= _NEAR * found.best.value
     members = distinct(found.members[near])
     material = {**problem.fixed, **dict(zip(problem.box.names, (float(v) for v in values)))}
     ordered = {p.name: material[p.name] for p in LAWS[scene.law].parameters if p.name in material}
     note = note_of(scene, measured, errors)
     arrays = arrays_of(problem, fit, measured, unseen, values, known, errors, holdout, members, found, candidates)
     record.cost.update(
-        evaluations=found.evaluations, curves=len(measured), increments_per_point=problem.increments,
+        evaluations=evaluations, curves=len(measured), increments_per_point=problem.increments,
         objective=best.value,
     )  # fmt: skip
     attributes = {

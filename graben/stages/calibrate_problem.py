@@ -17,6 +17,7 @@ from graben.mechanics.search.space import Box
 from graben.schemas.faults import BadInput, Fault
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.stages.calibrate_state import State
+from graben.stages.calibrate_workers import Sent
 
 # starts, particles, generations, refined particles of each start, increments between two points
 FIDELITY = {"draft": (1, 24, 60, 3, 1), "standard": (4, 24, 100, 4, 2), "reference": (12, 48, 200, 6, 4)}
@@ -67,7 +68,7 @@ class Problem:
             guesses = staged if guesses is None else np.concatenate([staged, guesses])
         objective = self.objective(curves)
         found = search(
-            objective,
+            objective if state.workers.executor is None else Sent(objective),
             self.box.size,
             plan,
             seed=self.scene.seed,

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import pickle
+import zlib
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from multiprocessing import get_context
 
+import numpy as np
+from numpy.typing import NDArray
+
 from graben.stages.workers import PATIENCE_S, await_worker, connect
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -20,11 +28,29 @@ class Workers:
     chunk: int = 1
 
 
+class Sent:
+    """A function of points (c, k) that is packed once, and unpacked once in each process: the curves within it cost
+    more to send with every task than a tenth of the task."""
+
+    def __init__(self, function: Callable[[Array], Array]) -> None:
+        self.packed = zlib.compress(pickle.dumps(function))
+
+    def __call__(self, points: Array) -> Array:
+        return _unpacked(self.packed)(points)
+
+
+@lru_cache(maxsize=8)
+def _unpacked(packed: bytes) -> Callable[[Array], Array]:
+    function: Callable[[Array], Array] = pickle.loads(zlib.decompress(packed))
+    return function
+
+
 @contextmanager
 def workers_of(search: str, workers: int, particles: int, cluster: str | None) -> Iterator[Workers]:
     """The workers of a search: with `cluster` those of the Dask scheduler there, with "appso" processes.
 
-    Two tasks for each worker and generation: fewer leave workers idle, more cost more than they share out.
+    On a cluster two tasks for each worker and generation, since workers differ. Processes here get one each: the
+    swarm runs ahead by a generation, so none waits for another, and a task costs as much as one particle.
     """
     if cluster is not None:
         client = connect(cluster, PATIENCE_S)
@@ -35,6 +61,6 @@ def workers_of(search: str, workers: int, particles: int, cluster: str | None) -
     elif search == "appso" and workers > 1:
         # Processes begun afresh: a fork of a process with compiled threads may hang.
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            yield Workers(pool, math.ceil(particles / (2 * workers)))
+            yield Workers(pool, math.ceil(particles / workers))
     else:
         yield Workers()

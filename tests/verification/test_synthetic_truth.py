@@ -8,8 +8,10 @@ import pytest
 from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.materials.point import drive
 from graben.mechanics.search.curves import Curve, CurveFit, Weights
+from graben.mechanics.search.first_state import settle
 from graben.mechanics.search.identifiability import identify
-from graben.mechanics.search.levenberg_marquardt import jacobian, levenberg_marquardt
+from graben.mechanics.search.levenberg_marquardt import levenberg_marquardt
+from graben.mechanics.search.objective import Objective, Priors
 from graben.mechanics.search.space import Box
 
 LAW = LAWS["drucker-prager"]
@@ -56,8 +58,11 @@ def exact(confining: float, top: float, truth: dict[str, float], steps: int = 41
     return Curve(f"{confining / 1e6:g} MPa", stress, strain)
 
 
-def noisy(curves: list[Curve], size: float, rng: np.random.Generator, correlated: bool = False) -> list[Curve]:
-    """Noise of `size` times each curve's largest stress, and strain; correlated: 0.6 from point to point."""
+def noisy(
+    curves: list[Curve], size: float, rng: np.random.Generator, correlated: bool = False, first: bool = True
+) -> list[Curve]:
+    """Noise of `size` times each curve's largest stress, and strain; correlated: 0.6 from point to point; first: on
+    the first state too, from which the fit starts."""
     out = []
     for c in curves:
         stress, strain = c.stress.copy(), c.strain.copy()
@@ -66,61 +71,74 @@ def noisy(curves: list[Curve], size: float, rng: np.random.Generator, correlated
             if correlated:
                 for k in range(1, white.size):
                     white[k] = 0.6 * white[k - 1] + 0.8 * white[k]
-            white[0] = 0.0  # the first state is where the fit starts: prescribed, not compared
+            white[0] *= first
             values[:, column] += size * np.abs(values[:, column]).max() * white
         out.append(Curve(c.name, stress, strain))
     return out
 
 
-def fitted(curves: list[Curve], truth: dict[str, float], free: list[str], box: Box, lag: int = 0):
-    """Fit from a start off the truth; (x, identifiability) in the unit box."""
+def fitted(curves: list[Curve], truth: dict[str, float], free: list[str], box: Box, lag: int = 5):
+    """Fit from a start off the truth, as `calibrate` ends; (x, identifiability, settled) in the unit box."""
     fit = CurveFit(LAW.name, {k: v for k, v in truth.items() if k not in free}, free, curves, EVEN)
     start = np.clip(box.to_unit(np.array([truth[n] for n in free])) + 0.05, 0.02, 0.98)
-
-    def residuals(unit: np.ndarray) -> np.ndarray:
-        return fit.residuals(box.to_values(unit))
-
-    x = levenberg_marquardt(residuals, start).x
-    r = residuals(x[None])[0]
-    return x, identify(x, r, jacobian(residuals, x, 1e-4), groups=fit.groups, lag=lag)
+    objective = Objective(fit, box, Priors.none())
+    settled = settle(objective, levenberg_marquardt(objective, start))
+    best = settled.best
+    known = identify(best.x, best.residuals, best.jacobian, groups=fit.groups, lag=lag, beside=settled.moved)
+    return best.x, known, settled
 
 
-def coverage(size: float, repeats: int, correlated: bool, lag: int) -> tuple[np.ndarray, np.ndarray]:
+def coverage(size: float, repeats: int, correlated: bool, first: bool) -> tuple[np.ndarray, np.ndarray]:
     """Fractions of the repeats whose 95 % intervals hold the truth: per parameter, plain and robust errors."""
     curves = [exact(c, 0.02, TRUTH) for c in (0.5e6, 1e6, 4e6)]
     truth = BOX.to_unit(np.array([TRUTH[n] for n in FREE]))
     inside = np.zeros((repeats, 2, len(FREE)))
     for k in range(repeats):
-        x, known = fitted(noisy(curves, size, np.random.default_rng(k), correlated), TRUTH, FREE, BOX, lag)
-        assert known.identifiable.all()
+        x, known, _ = fitted(noisy(curves, size, np.random.default_rng(k), correlated, first), TRUTH, FREE, BOX)
         inside[k, 0] = np.abs(x - truth) < 1.96 * known.standard_error
         inside[k, 1] = np.abs(x - truth) < 1.96 * known.robust_error
     plain, robust = inside.mean(axis=0)
+    print(f"noise {size:.0%}, {correlated=}, {first=}: plain {np.round(plain, 3)}, robust {np.round(robust, 3)}")
     return plain, robust
 
 
 @pytest.mark.verify
+@pytest.mark.parametrize("first", [False, True])
+@pytest.mark.parametrize("correlated", [False, True])
 @pytest.mark.parametrize("size", [0.01, 0.03])
-def test_intervals_cover_the_truth(size: float) -> None:
-    """200 repeats, independent noise: 95 % intervals hold each parameter 90 to 99 times in 100."""
-    plain, robust = coverage(size, 200, correlated=False, lag=0)
-    print(f"noise {size:.0%}: plain {np.round(plain, 3)}, robust {np.round(robust, 3)}")
-    assert 0.93 <= plain.mean() <= 0.97 and (plain >= 0.90).all() and (plain <= 0.99).all()
-    assert (robust >= 0.90).all() and robust.mean() <= 0.99
+def test_intervals_cover_the_truth(size: float, correlated: bool, first: bool) -> None:
+    """200 repeats: 95 % intervals hold each parameter 90 to 99 times in 100, whether the noise is independent or
+    lasts over points, and whether the first state is exact or as noisy as the rest."""
+    plain, robust = coverage(size, 200, correlated, first)
+    assert (robust >= 0.90).all() and 0.92 <= robust.mean() <= 0.99
+    if not correlated:
+        assert (plain >= 0.89).all() and 0.92 <= plain.mean() <= 0.97
 
 
-@pytest.mark.verify
-def test_robust_intervals_cover_more_under_correlated_noise() -> None:
-    """Noise that lasts over points makes the plain intervals far too narrow (66 of 100); the robust ones hold
-    the truth more often (82), though not as often as they say: 40 points say little about how noise lasts."""
-    plain, robust = coverage(0.01, 200, correlated=True, lag=6)
-    print(f"correlated: plain {np.round(plain, 3)}, robust {np.round(robust, 3)}")
-    assert robust.mean() > plain.mean() + 0.1 and robust.mean() >= 0.78
+def test_intervals_cover_the_truth_in_a_few_repeats() -> None:
+    """12 repeats of 5 parameters with lasting noise everywhere: 95 % of 60 are 57; the plain ones hold 40."""
+    plain, robust = coverage(0.01, 12, correlated=True, first=True)
+    assert robust.mean() >= 0.88 and plain.mean() <= 0.85
+
+
+def test_the_first_state_of_noisy_curves_is_fitted_along_and_that_of_smooth_ones_is_not() -> None:
+    curves = [exact(c, 0.02, TRUTH) for c in (0.5e6, 4e6)]
+    truth = BOX.to_unit(np.array([TRUTH[n] for n in FREE]))
+    loud = noisy(curves, 0.01, np.random.default_rng(5))
+    for c, e in zip(loud, curves):
+        c.stress[0, 1] = e.stress[0, 1] + 5e5  # half an MPa off
+    x, known, settled = fitted(loud, TRUTH, FREE, BOX)
+    assert settled.moved == 2
+    np.testing.assert_allclose(settled.shifts, -5e5, atol=1.5e5)
+    assert (np.abs(x - truth) < 3.5 * known.robust_error).all()
+    wavy = [Curve(c.name, c.stress * (1 + 0.05 * np.sin(np.arange(41) / 8))[:, None], c.strain) for c in curves]
+    _, _, settled = fitted(wavy, TRUTH, FREE, BOX)
+    assert settled.moved == 0 and not settled.shifts.any()
 
 
 def test_parameters_come_back_within_their_intervals() -> None:
     curves = [exact(c, 0.02, TRUTH) for c in (0.5e6, 1e6, 4e6)]
-    x, known = fitted(noisy(curves, 0.01, np.random.default_rng(11)), TRUTH, FREE, BOX)
+    x, known, _ = fitted(noisy(curves, 0.01, np.random.default_rng(11)), TRUTH, FREE, BOX)
     truth = BOX.to_unit(np.array([TRUTH[n] for n in FREE]))
     assert (np.abs(x - truth) < 3.5 * known.robust_error).all() and (known.robust_error < 0.1).all()
 
@@ -131,7 +149,7 @@ def test_two_parameters_of_which_only_the_product_is_seen_are_reported() -> None
     free = ["young_modulus", "friction_angle", "hardening_gain", "hardening_rate"]
     box = Box.of(free, [0.5e9, 0.7, 1e6, 0.003], [2e10, 1.1, 1e10, 30.0], [True, False, True, True])
     curves = [exact(c, 0.02, truth) for c in (0.5e6, 1e6, 4e6)]
-    x, known = fitted(noisy(curves, 0.01, np.random.default_rng(3)), truth, free, box)
+    x, known, _ = fitted(noisy(curves, 0.01, np.random.default_rng(3)), truth, free, box)
     assert known.identifiable.tolist() == [True, True, False, False]
     assert known.unseen[0] and not known.unseen[1:].any()
     direction = known.directions[0] / np.abs(known.directions[0]).max()

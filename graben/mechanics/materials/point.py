@@ -19,6 +19,7 @@ from graben.mechanics.materials.laws import find, update
 
 SMALLEST = 2.0**-12  # of an increment; below it the path counts as without solution
 _NEWTON = 12
+_BRACKETED = 40
 
 
 @kernel(error_model="numpy")
@@ -103,7 +104,10 @@ def increment(
             foreseen = grown * bend[i]
             bend[i] = deps[free[i]]
             deps[free[i]] += foreseen
-    for _iteration in range(_NEWTON):
+    # One stress under control is one equation: its root is kept between bounds, so that a kink in the law cannot make
+    # Newton go back and forth. A free side is at one: it is the largest principal stress of a pressed plane, 0.
+    below, above = -np.inf, np.inf
+    for iteration in range(_NEWTON if m != 1 else _BRACKETED):
         code = update(law_id, deps, sig, state, par, length, tangent)
         if code != OK:
             break
@@ -125,11 +129,24 @@ def increment(
             b[i] = change[row] - sig[row]
             for j in range(m):
                 a[i, j] = tangent[row, free[j]]
+        last = sig[free[0]] if m > 0 else 0.0
         for i in range(n):
             sig[i] = old_sig[i]
         for i in range(state.shape[0]):
             state[i] = old_state[i]
-        if not solve_small(a, b, m):
+        solved = solve_small(a, b, m)
+        if m == 1:
+            now = deps[free[0]]
+            if change[free[0]] > last:
+                below = max(below, now)
+            else:
+                above = min(above, now)
+            if above - below < 1e300 and below < above:
+                inside = solved and below < now + b[0] < above
+                if not inside or (iteration > 6 and iteration % 2 == 0):
+                    b[0] = 0.5 * (below + above) - now
+                    solved = True
+        if not solved:
             break
         for i in range(m):
             deps[free[i]] += b[i]

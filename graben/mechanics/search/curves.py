@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -62,7 +63,7 @@ class Weights:
 @kernel(error_model="numpy", nogil=True)
 def _batch(
     law_id, base, slots, values, start_state, length, tolerance, parts, seat_parts, seats, controls, targets, rows,
-    zero, stress, strain, reached,
+    zero, shift, stress, strain, reached, moved,
 ):  # fmt: skip
     """Responses of every candidate to every curve. One function: each layer of calls would compile the laws again."""
     curves, n = targets.shape[0], targets.shape[2]
@@ -75,12 +76,18 @@ def _batch(
         for i in range(slots.shape[0]):
             par[slots[i]] = values[k, i]
         prepare(law_id, par)
+        moved[k] = 0.0
+        for i in range(slots.shape[0]):
+            used = par[slots[i]]
+            if used != values[k, i]:
+                moved[k] += abs(values[k, i] - used) / (abs(values[k, i]) + abs(used))
         for c in range(curves):
             state[:] = start_state
             sig[:] = 0.0
             eps[:] = 0.0
             for i in range(n):
                 ramp[1, i] = zero[c, i] if seats[c, i] == 1 else 0.0
+            ramp[1, 1] += shift[k, c]
             done = drive(
                 law_id, par, length, tolerance, seat_parts, seats[c], ramp, sig, state, eps, seat_stress, seat_strain,
                 nothing,
@@ -105,11 +112,18 @@ def _batch(
 @dataclass(frozen=True)
 class Predictions:
     """stress, strain (candidates, curves, steps, 4), tensor shear; reached (candidates, curves) steps, a
-    fraction counts."""
+    fraction counts; moved (candidates,): by what fraction `CurveFit.used` differs from what was asked."""
 
     stress: Array
     strain: Array
     reached: Array
+    moved: Array
+
+
+@cache
+def _threads(workers: int) -> ThreadPoolExecutor:
+    """Threads that live as long as the process: a call is too short to start them anew."""
+    return ThreadPoolExecutor(workers)
 
 
 @dataclass
@@ -217,43 +231,53 @@ class CurveFit:
 
     def used(self, values: Array) -> Array:
         """What becomes of one candidate (k,): values that do not go together are moved as `Law.prepare` does, so
-        that `Law.check` accepts them. Same residuals, to the bit."""
+        that `Law.check` accepts them. Same predictions, to the bit."""
         par = self._base.copy()
         par[self._slots] = values
         prepare(self._id, par)
         return np.asarray(par[self._slots], dtype=np.float64)
 
-    def predict(self, values: Array) -> Predictions:
-        """Responses of candidates `values` (c, k), parameter values in SI in the order of `free`."""
+    @property
+    def starts_free(self) -> NDArray[np.bool_]:
+        """(curves,) where the first axial stress is only where the path starts, and is compared."""
+        seated = (self._seats[:, 1] == 1) & (self._controls[:, 1] == 0)
+        return seated & np.array([1 in c.fit_stress for c in self.curves])
+
+    def predict(self, values: Array, shifts: Array | None = None) -> Predictions:
+        """Responses of candidates `values` (c, k), parameter values in SI in the order of `free`.
+
+        shifts (c, curves): added to the first axial stress of each curve, in Pa, where `starts_free`."""
         values = np.ascontiguousarray(np.atleast_2d(values), dtype=np.float64)
         shape = (len(values), *self._targets.shape)
         stress, strain = np.zeros(shape), np.zeros(shape)
-        reached = np.empty(shape[:2])
+        reached, moved = np.empty(shape[:2]), np.empty(shape[0])
+        shifts = np.zeros(shape[:2]) if shifts is None else np.ascontiguousarray(shifts, dtype=np.float64)
 
         def run(first: int, last: int) -> None:
             _batch(
                 self._id, self._base, self._slots, values[first:last], self._start, float(self.length),
                 float(self.tolerance), int(self.parts), int(self.seat_parts), self._seats, self._controls,
-                self._targets, self._rows, self._zero, stress[first:last], strain[first:last], reached[first:last],
+                self._targets, self._rows, self._zero, shifts[first:last], stress[first:last], strain[first:last],
+                reached[first:last], moved[first:last],
             )  # fmt: skip
 
-        workers = min(self.workers, len(values))
-        if workers > 1:  # the kernel releases the interpreter; a second compilation for threads is saved
-            edges = np.linspace(0, len(values), workers + 1).astype(int)
-            with ThreadPoolExecutor(workers) as pool:
-                list(pool.map(run, edges[:-1], edges[1:]))
+        if self.workers > 1 and len(values) > 1:
+            # the kernel releases the interpreter; small parts, since a candidate that fails costs more than others
+            edges = np.linspace(0, len(values), min(3 * self.workers, len(values)) + 1).astype(int)
+            list(_threads(self.workers).map(run, edges[:-1], edges[1:]))
         else:
             run(0, len(values))
         strain[..., 3:] *= 0.5
-        return Predictions(stress, strain, reached)
+        return Predictions(stress, strain, reached, moved)
 
-    def residuals(self, values: Array) -> Array:
+    def residuals(self, values: Array, shifts: Array | None = None) -> Array:
         """Weighted residuals (c, m): one per compared point, then one per curve for the part of it without
-        solution."""
-        found = self.predict(values)
+        solution; shifts as in `predict`."""
+        found = self.predict(values, shifts)
         curve, row, column = self._where
         model = np.where(self._kind == 0, found.stress[:, curve, row, column], found.strain[:, curve, row, column])
-        missing = np.clip(1.0 - found.reached / (self._rows - 1), 0.0, 2.0)
+        # what was moved counts too: a search would not find back over values that make no difference
+        missing = np.clip(1.0 - found.reached / (self._rows - 1), 0.0, 2.0) + found.moved[:, None]
         # a strain that runs away must not overflow the sum of squares
         parts = np.clip((model - self._goal) * self._weight, -1e6, 1e6)
         return np.concatenate([parts, self.weights.penalty * missing / np.sqrt(len(self.curves))], axis=1)

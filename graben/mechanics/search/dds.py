@@ -8,7 +8,7 @@ trials is the only setting that matters.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,17 @@ from numpy.typing import NDArray
 from graben.mechanics.search.swarm import SwarmResult, finite_values, stratified
 
 Array = NDArray[np.float64]
+
+
+def _steps(rng: np.random.Generator, trials: int, chains: int, size: int, reach: float) -> Iterator[Array]:
+    """The perturbations (chains, size) of every trial, drawn many trials at a time."""
+    for begun in range(0, trials, 256):
+        i = np.arange(begun + 1, min(begun + 256, trials) + 1)
+        chance = 1.0 - np.log(i) / math.log(max(trials, 2))
+        chosen = rng.random((i.size, chains, size)) < chance[:, None, None]
+        one = np.eye(size, dtype=bool)[rng.integers(size, size=(i.size, chains))]
+        chosen |= one & ~chosen.any(axis=2, keepdims=True)
+        yield from np.where(chosen, reach * rng.standard_normal((i.size, chains, size)), 0.0)
 
 
 def dds(
@@ -49,13 +60,9 @@ def dds(
     pick, row = np.argmin(values, axis=0), np.arange(chains)
     best, best_values = x[pick, row].copy(), values[pick, row].copy()
     history = [float(best_values.min())]
-    for i in range(1, trials - first + 1):
-        chance = 1.0 - math.log(i) / math.log(max(trials - first, 2))
-        chosen = rng.random((chains, size)) < chance
-        chosen[row, rng.integers(size, size=chains)] |= ~chosen.any(axis=1)
-        trial = best + np.where(chosen, reach * rng.standard_normal((chains, size)), 0.0)
+    for i, step in enumerate(_steps(rng, trials - first, chains, size, reach), 1):
         # reflected at 0, then at 1
-        trial = np.maximum(1.0 - np.abs(1.0 - np.abs(trial)), 0.0)
+        trial = np.maximum(1.0 - np.abs(1.0 - np.abs(best + step)), 0.0)
         found = finite_values(function(trial), chains)
         better = found <= best_values
         best[better], best_values[better] = trial[better], found[better]

@@ -9,8 +9,9 @@ covariance (J^T J / s^2 + 12 I)^-1. Where the data see much, nothing changes. A 
 inverse variance there.
 
 Correlation: residuals along one curve are not independent (a slip event moves many points at once). The
-robust errors let residuals within a curve be correlated in any way up to a lag (Newey-West weights): they are
-the ones to quote.
+robust errors are the largest of the plain ones, of those that let residuals within a curve be correlated in any way
+up to a lag (Newey-West weights: no assumption, but too small where lags are few), and of those of an autoregressive
+sequence (`autocorrelation.py`). They are the ones to quote.
 
 Each right singular vector of J is a combination of parameters; its standard deviation from the data alone is
 s over the singular value. A combination whose standard deviation exceeds what the bounds alone give
@@ -23,6 +24,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from graben.mechanics.search.autocorrelation import lasting_meat
 
 Array = NDArray[np.float64]
 
@@ -61,14 +64,16 @@ def identify(
     edge: float = 1e-6,
     bounded: bool = True,
     precision: Array | None = None,
+    beside: int = 0,
 ) -> Identifiability:
     """Analyse an optimum x (k,) with residuals (m,) and jacobian (m, k), both from the unit box.
 
     groups (m,) numbers the curve and quantity a residual belongs to, in order along it; residuals of one
-    group are taken as correlated up to `lag` points apart. edge: nearer to a bound than this counts as held
+    group are taken as correlated up to `lag` points apart, and beyond as an autoregressive sequence is; lag 0:
+    independent. edge: nearer to a bound than this counts as held
     by it. bounded: the bounds count as knowledge (without, a direction that the data do not see makes the
     covariance singular). precision (k,): inverse variances of Gaussian priors; residuals and jacobian are
-    those of the data alone.
+    those of the data alone. beside: parameters fitted along, which the jacobian has been cleared of.
     """
     k = x.size
     if jacobian.shape != (residuals.size, k):
@@ -83,8 +88,11 @@ def identify(
         return Identifiability(
             free, error, robust_error, covariance, correlation, known, none, np.empty((0, k)), none.astype(bool)
         )
-    j = jacobian[:, index]
-    freedom = max(1, residuals.size - index.size)
+    # what never moves says nothing: the first point, where a path starts, and parts without a penalty
+    counts = (residuals != 0.0) | jacobian.any(axis=1)
+    j, residuals = jacobian[counts][:, index], residuals[counts]
+    groups = None if groups is None else groups[counts]
+    freedom = max(1, residuals.size - index.size - beside)
     # a perfect fit leaves no scatter to judge by; rounding is then the scatter
     s2 = max(float(residuals @ residuals) / freedom, 1e-30)
     known_before = np.full(index.size, UNSEEN**-2.0 if bounded else 0.0)
@@ -93,13 +101,16 @@ def identify(
     prior = np.diag(known_before)
     inverse = np.linalg.inv(j.T @ j / s2 + prior)
     meat = _meat(j, residuals, groups, lag) * (residuals.size / freedom) / s2**2 + prior
-    robust = inverse @ meat @ inverse
+    robust = np.diag(inverse @ meat @ inverse)
+    if groups is not None and lag > 0:
+        lasting = lasting_meat(j, residuals, groups)[0] / s2**2 + prior
+        robust = np.maximum(robust, np.diag(inverse @ lasting @ inverse))
     deviation = np.sqrt(np.diag(inverse))
     full = np.ix_(index, index)
     covariance[full], correlation[full] = inverse, inverse / np.outer(deviation, deviation)
     error[index] = deviation
     # neither estimate may claim less than the other by chance: a few slips can make the sandwich too small
-    robust_error[index] = np.maximum(np.sqrt(np.maximum(np.diag(robust), 0.0)), deviation)
+    robust_error[index] = np.maximum(np.sqrt(np.maximum(robust, 0.0)), deviation)
     known[index] = robust_error[index] < 0.5 / np.sqrt(np.maximum(known_before, UNSEEN**-2.0))
     _u, values, vt = np.linalg.svd(j, full_matrices=False)
     seen = values > 1e-10 * max(values.max(), 1e-300)

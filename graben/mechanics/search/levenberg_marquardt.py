@@ -80,18 +80,19 @@ def levenberg_marquardt(
         gradient = jac.T @ r
         held = ((x <= 0.0) & (gradient > 0.0)) | ((x >= 1.0) & (gradient < 0.0))
         free = np.flatnonzero(~held)
-        norms = np.linalg.norm(jac, axis=0)
+        gram = jac.T @ jac
+        norms = np.sqrt(np.diag(gram))
         scale = np.maximum(scale, norms)
         if free.size == 0 or value == 0.0 or not norms[free].any():
             reason = "no parameter can improve it"
             break
         s = np.where(scale[free] > 0.0, scale[free], 1.0)
-        normal = (jac[:, free] / s).T @ (jac[:, free] / s)
-        right = -(gradient[free] / s)
+        # one decomposition serves every damping
+        stiff, axes = np.linalg.eigh(gram[np.ix_(free, free)] / (s * s[:, None]))
+        right = -(gradient[free] / s) @ axes
         lambdas = damping * factor ** np.arange(-(trials // 2), trials - trials // 2)
         points = np.repeat(x[None], trials, axis=0)
-        systems = normal + lambdas[:, None, None] * np.eye(free.size)
-        moves = np.linalg.solve(systems, np.repeat(right[None, :, None], trials, axis=0))[..., 0] / s
+        moves = (right / (np.maximum(stiff, 0.0) + lambdas[:, None])) @ axes.T / s
         largest = np.maximum(np.abs(moves).max(axis=1), move_limit)
         points[:, free] = np.clip(x[free] + moves * (move_limit / largest)[:, None], 0.0, 1.0)
         tried = function(points)

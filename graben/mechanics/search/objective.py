@@ -61,12 +61,12 @@ class Objective:
     def prior_scale(self) -> float:
         return self.noise * math.sqrt((1.0 + self.lag) / self.fit.points)
 
-    def data(self, unit: Array) -> Array:
-        """(c, k) -> (c, m): residuals of the curves alone."""
-        return self.fit.residuals(self.box.to_values(unit))
+    def data(self, unit: Array, shifts: Array | None = None) -> Array:
+        """(c, k) -> (c, m): residuals of the curves alone; shifts (c, curves) as in `CurveFit.predict`."""
+        return self.fit.residuals(self.box.to_values(unit), shifts)
 
-    def __call__(self, unit: Array) -> Array:
+    def __call__(self, unit: Array, shifts: Array | None = None) -> Array:
         """(c, k) -> (c, m + j): residuals of curves and priors."""
         if self.priors.columns.size == 0:
-            return self.data(unit)
-        return np.concatenate([self.data(unit), self.priors.residuals(unit, self.prior_scale)], axis=1)
+            return self.data(unit, shifts)
+        return np.concatenate([self.data(unit, shifts), self.priors.residuals(unit, self.prior_scale)], axis=1)

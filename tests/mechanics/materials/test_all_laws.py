@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from graben.mechanics.materials.laws import LAWS, pack, update
 from graben.mechanics.materials.lubliner import steepest_dilation
+from graben.mechanics.materials.point import follow
 
 NONE = np.empty((0, 0))
 Draw = Callable[[np.random.Generator, float], dict[str, Any]]
@@ -207,6 +208,45 @@ def test_plastic_flow_dissipates(law: str, seed: int, decade: float) -> None:
             tip = 0.301 * values["flow_eccentricity"] * values["initial_yield"] * max(plastic[:3].sum(), 0.0)
         assert now @ plastic >= -tip - 1e-9 * size - 1e-11 * rounding
         before = now
+
+
+@pytest.mark.parametrize("law", DRAWS)
+@pytest.mark.parametrize("word", ["eee", "seee", "sese", "sesees"])
+def test_plane_stress_plane_strain_triaxial_and_space_hold_what_is_prescribed(law: str, word: str) -> None:
+    """The sides are pressed while the axis is shortened, released and shortened further: as far as a path has a
+    solution, stresses under control are held and strains met; the triaxial test in space is that of axisymmetry."""
+    whole = 0
+    for seed in range(6):
+        _, values = material(law, seed, 10.0)
+        par, n = pack(law, values), len(word)
+        path = np.zeros((41, n))
+        axial = np.concatenate(
+            [np.linspace(0, -2e-3, 16), np.linspace(-2e-3, -1e-3, 6)[1:], np.linspace(-1e-3, -4e-3, 21)[1:]]
+        )
+        path[:, 1] = axial
+        stressed = np.array([c == "s" for c in word])
+        stressed[3:] = False  # those stay at 0
+        path[:, stressed] = -1e6 * np.minimum(1.0, np.arange(41) / 5)[:, None]
+        if word == "eee":
+            path[:, 0] = 0.3 * axial
+        r = follow(law, par, word, path, length=0.1)
+        assert np.isfinite(r.stress).all() and np.isfinite(r.strain).all()
+        full = path if n != 3 else np.insert(path, 2, 0.0, axis=1)
+        letters = word if n != 3 else "eese"
+        rows = int(r.reached[0]) + 1
+        whole += bool(r.complete[0])
+        for i, letter in enumerate(letters):
+            got = (r.stress if letter == "s" else r.strain)[0, :rows, i]
+            size = np.abs(r.stress[0, :rows]).max() if letter == "s" else 4e-3
+            np.testing.assert_allclose(got, full[:rows, i], atol=1e-8 * size)
+        if word == "sesees":
+            flat = follow(law, par, "sese", path[:, :4], length=0.1)
+            common = min(rows, int(flat.reached[0]) + 1)
+            if law != "transverse-elastic" or common == 41:
+                scale = np.abs(flat.stress).max()
+                np.testing.assert_allclose(r.stress[0, :common, :4], flat.stress[0, :common], atol=1e-5 * scale)
+    # without any strength, or where strength falls faster than the elastic sides give, no state is left to hold
+    assert whole >= (2 if word == "eee" else 4)
 
 
 def _rotate(v: np.ndarray, turn: np.ndarray, shear: float) -> np.ndarray:

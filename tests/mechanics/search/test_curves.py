@@ -186,4 +186,7 @@ def test_values_that_do_not_go_together_become_the_nearest_that_do(law, fixed, a
     values = np.array(list(asked.values()))
     used = fit.used(values)
     assert LAWS[law].faults({**fixed, **dict(zip(asked, used))}) == []
-    np.testing.assert_array_equal(fit.residuals(used[None]), fit.residuals(values[None]))
+    asked_for, taken = fit.predict(values[None]), fit.predict(used[None])
+    np.testing.assert_array_equal(asked_for.stress, taken.stress)
+    assert asked_for.moved[0] > 0.0 == taken.moved[0]
+    assert fit.objective(values[None])[0] > fit.objective(used[None])[0]
