@@ -49,6 +49,10 @@ verify: $(READY) ## the long verification against closed forms
 verify-udec: $(READY) ## 16 tessellations of voronoi-granite against UDEC's curves (16 CPU minutes)
 	$(BIN)/python pipelines/upscaling/verify_udec.py $(RESULTS)/verify --picture docs/images/udec-band.png
 
+.PHONY: verify-extrapolation
+verify-extrapolation: $(READY) ## laws fitted up to 4 MPa against our blocks at 3 to 10 MPa (12 CPU minutes)
+	$(BIN)/python pipelines/upscaling/verify_extrapolation.py $(RESULTS)/verify --picture docs/images/extrapolation.png
+
 .PHONY: bench
 bench: $(READY) ## the benchmarks; JSON lines in results/bench/
 	@mkdir -p $(RESULTS)/bench
