@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -18,12 +18,13 @@ from graben.schemas.faults import BadInput, Fault
 @dataclass(frozen=True)
 class Run:
     """One artifact of blocks: its file, its arrays, its lateral stress (Pa, compression negative), and its seed
-    (-1: not known)."""
+    (-1: not known); flags of blocks that are taken out sooner or later (none: empty)."""
 
     path: Path
     history: History
     confining_stress: float
     seed: int = -1
+    removed: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -37,7 +38,7 @@ class Run:
         domain = domain_outline(h.network, h.current[state]) if state else h.domain
         beyond = rev.outside_by(domain)
         if beyond <= 1e-3 * rev.radius:
-            return []
+            return self._refuse_removed(rev, key)
         shape = "circle" if isinstance(rev, Circle) else "polygon"
         x, y = rev.centre
         low, high = domain.min(axis=0), domain.max(axis=0)
@@ -47,6 +48,16 @@ class Run:
             f"it reaches {beyond:g} m beyond"
         )
         return [Fault(str(self.path), key, value, expected)]
+
+    def _refuse_removed(self, rev: Rev, key: str) -> list[Fault]:
+        """A fault where a region meets blocks that are taken out: their strain is not known."""
+        network = self.history.network
+        meets = rev.crossed(network, network.position) | rev.contains(network.interior)
+        if not self.removed.any() or not (meets & self.removed).any():
+            return []
+        x, y = rev.centre
+        value = f"radius {rev.radius:g} m at ({x:g}, {y:g}) m"
+        return [Fault(str(self.path), key, value, "a REV clear of blocks that are taken out")]
 
 
 def read_run(path: Path) -> Run:
@@ -90,7 +101,10 @@ def read_run(path: Path) -> Run:
         _ = history.network
     except ValueError as error:
         raise BadInput(Fault(str(path), "zone_vertex", "", f"blocks with closed outlines ({error})")) from error
-    return Run(path, history, float(data["confining_stress"]), int(data.attrs.get("seed", -1)))
+    removed = np.asarray(
+        data["block_removed"].values > 0 if "block_removed" in data else np.zeros((0, 0), dtype=bool)
+    )
+    return Run(path, history, float(data["confining_stress"]), int(data.attrs.get("seed", -1)), removed.any(axis=0))
 
 
 def _floats(data: xarray.Dataset, name: str) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 from graben.mechanics.blocks import snapshot
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.history import History
+from graben.mechanics.blocks.in_situ import InSitu, put_in
 from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets
 from graben.mechanics.blocks.mending import mend
 from graben.mechanics.blocks.model import BlockModel, Damping
@@ -30,6 +31,9 @@ from graben.stages.record import Progress, Record, silent
 
 # Steps of loading for each fidelity; their measured trade is in docs/dem-run-blocks.md
 FIDELITY = {"draft": 12_500, "standard": 50_000, "reference": 200_000}
+
+# How a loading went that follows a force check.
+_PACED = ("loading_steps", "force_check_worst", "force_check_mean")
 
 # Slivers of given or cut blocks are mended below this share of tessellation.edge.
 _MENDED = 0.1
@@ -58,10 +62,12 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         tessellation = _tessellation(scene)
         if programme is None:
             model = _model(scene, tessellation, scene.loading.duration / steps, (0.0, 0.0))
+            _put_stress_in(scene, model)
             test = Biaxial(scene, model, steps)
         else:
             gravity = (programme.horizontal, programme.vertical)
             model = _model(scene, tessellation, programme.end / steps, gravity)
+            _put_stress_in(scene, model)
             test = Rising(scene, model, steps)
     except ValueError as error:
         raise BadInput(Fault(str(scene.source.path), "", "", f"a scene that can be run ({error})")) from error
@@ -101,7 +107,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         "mass_ratio_max": float(model.mass_ratio.max()),
         "consolidation_unbalanced_force_ratio": float(test.rest[0]),
         "largest_overlap_m": max(history.overlap),
-        **{name: headline[name] for name in test.ERRORS},
+        **{name: headline[name] for name in (*test.ERRORS, *_PACED) if name in headline},
         **{f"block_{name}": value for name, value in tessellation.statistics().items()},
     }
     write_artifact(output, LAYOUT, arrays, record)
@@ -155,6 +161,18 @@ def _model(scene: BlocksScene, tessellation: Tessellation, dt: float, gravity: t
         strength=Strength(*scene.rock.strength) if scene.rock.zones == "mohr-coulomb" else None,
         rigid=scene.rock.zones == "rigid",
     )
+
+
+def _put_stress_in(scene: BlocksScene, model: BlockModel) -> None:
+    s = scene.in_situ
+    if s is None:
+        return
+    level = max(y for _, y in scene.domain.corners) if s.level is None else s.level
+    stress, rise = (s.sxx, s.syy, s.sxy), (s.sxx_rise, s.syy_rise, s.sxy_rise)
+    if s.k0 is not None and scene.programme is not None:
+        weight = -scene.rock.density * scene.programme.vertical
+        stress, rise = (s.k0 * s.syy, s.syy, 0.0), (s.k0 * weight, weight, 0.0)
+    put_in(model, InSitu(stress, rise, level))
 
 
 def _damping(scene: BlocksScene, dt: float) -> Damping:

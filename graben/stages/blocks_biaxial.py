@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from graben.mechanics.blocks.compression import Courses, compress, consolidate, 
 from graben.mechanics.blocks.courses import Course
 from graben.mechanics.blocks.history import History, mean_stress
 from graben.mechanics.blocks.model import BlockModel
+from graben.mechanics.blocks.pace import ForceCheck, Pace
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.schemas.scenes.blocks_loading import Loading
 from graben.stages.record import Progress
@@ -29,7 +31,9 @@ class Biaxial:
     def __init__(self, scene: BlocksScene, model: BlockModel, steps: int) -> None:
         self.scene, self.model, self.steps = scene, model, steps
         self.rest = np.zeros(2)  # unbalanced force ratio of consolidation, its steps
-        self.courses = _courses(scene.loading, scene.loading.duration / steps)
+        self.check = _force_check(scene, steps)
+        self.pace = None if self.check is None else Pace()
+        self.courses = _courses(scene.loading, scene.loading.duration / steps, self.check is not None)
 
     def begin(self, progress: Progress) -> None:
         """Consolidate."""
@@ -53,14 +57,27 @@ class Biaxial:
 
         speed, behind = -self.scene.loading.speed, len(history.time)
         loose = self.scene.numerics.stop_loose_blocks
-        compress(self.model, speed, self.steps, states, saved, saved=behind, courses=self.courses, stop_loose=loose)
+        compress(
+            self.model,
+            speed,
+            self.steps,
+            states,
+            saved,
+            saved=behind,
+            courses=self.courses,
+            stop_loose=loose,
+            paced=None if self.pace is None or self.check is None else (self.pace, self.check),
+        )
 
     def state(self) -> dict[str, np.ndarray]:
         """What a checkpoint must hold beside the model."""
-        return {"rest": self.rest}
+        pace = {} if self.pace is None else {f"pace_{k}": np.array(v) for k, v in asdict(self.pace).items()}
+        return {"rest": self.rest, **pace}
 
     def bring_back(self, state: dict[str, np.ndarray]) -> None:
         self.rest = state["rest"]
+        if self.pace is not None:
+            self.pace = Pace(**{f.name: state[f"pace_{f.name}"].item() for f in fields(Pace)})
 
     def arrays(self, history: History) -> dict[str, np.ndarray]:
         """Arrays of the artifact that only this test has."""
@@ -77,6 +94,14 @@ class Biaxial:
         if loading.speed_course is None:
             return float(-loading.speed * time / height)
         return float(-Course(loading.speed_course).integral(time) / height)
+
+    def _paced(self) -> dict[str, float]:
+        """Steps of loading, and the force check along them."""
+        if self.pace is None:
+            return {}
+        mean = self.pace.summed / max(self.pace.looks, 1)
+        steps = self.model.steps_done - int(self.rest[1])
+        return {"loading_steps": steps, "force_check_worst": self.pace.worst, "force_check_mean": mean}
 
     def headline(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         """Peak of the top wall's mean stress (Pa, compression negative), nominal strain there, error measures."""
@@ -103,13 +128,21 @@ class Biaxial:
             "energy_error": energy_error(arrays),
             "kinetic_over_stored_energy": float(kinetic_share(arrays)[after].mean()),
             "lateral_over_applied_stress": float((lateral / applied)[after].mean()),
+            **self._paced(),
             "bottom_over_top_reaction": float((push[after, sides.bottom, 1] / -push[after, sides.top, 1]).mean()),
         }
 
 
-def _courses(loading: Loading, dt: float) -> Courses | None:
-    """Courses over steps of dt; None where speed and pressure are steady."""
-    if loading.speed_course is None and loading.confining_course is None:
+def _force_check(scene: BlocksScene, steps: int) -> ForceCheck | None:
+    n = scene.numerics
+    if n.force_check is None:
+        return None
+    return ForceCheck(n.force_check, steps / (n.most_steps or 8 * steps), steps / (n.least_steps or steps))
+
+
+def _courses(loading: Loading, dt: float, always: bool) -> Courses | None:
+    """Courses over steps of dt; None where speed and pressure are steady, unless they are wanted always."""
+    if loading.speed_course is None and loading.confining_course is None and not always:
         return None
     down = loading.speed_course or [(0.0, 0.0), (0.01 * loading.duration, loading.speed)]
     pressure = loading.confining_course

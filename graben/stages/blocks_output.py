@@ -22,10 +22,13 @@ def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
     beside = output.with_name(output.stem + "-joints.nc")
     with VtuSeries(output) as zones, VtuSeries(beside) as joints:
         for k, time in enumerate(arrays["time"]):
+            removed = arrays["block_removed"][k] > 0 if "block_removed" in arrays else np.zeros(0, dtype=bool)
+            there = ~removed[owner] if len(removed) else slice(None)
             stress = arrays["zone_stress"][k]
             if rigid:
                 # Forces in the plane say nothing about zz: 0 in the file.
                 stress = np.insert(arrays["block_stress"][k], 2, 0.0, axis=1)[owner]
+            stress = stress[there]
             tensor = np.zeros((len(stress), 6))
             tensor[:, [0, 1, 2, 3]] = stress
             centre = 0.5 * (stress[:, 0] + stress[:, 1])
@@ -33,7 +36,7 @@ def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
             zones.add(
                 time,
                 reference + arrays["displacement"][k],
-                {"triangle": triangles},
+                {"triangle": triangles[there]},
                 {
                     "displacement": arrays["displacement"][k],
                     "velocity": arrays["velocity"][k],
@@ -43,8 +46,8 @@ def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
                     "stress": tensor,
                     "stress_major_compressive": centre - radius,
                     "stress_minor_compressive": centre + radius,
-                    "block": owner,
-                    **{name[5:]: arrays[name][k] for name in YIELD if name in arrays},
+                    "block": owner[there],
+                    **{name[5:]: arrays[name][k][there] for name in YIELD if name in arrays},
                 },
             )
             part = slice(end[k], end[k + 1])

@@ -10,6 +10,7 @@ import numpy as np
 
 from graben.mechanics.blocks import programme as mechanics
 from graben.mechanics.blocks.courses import Course
+from graben.mechanics.blocks.excavation import blocks_in, excavate
 from graben.mechanics.blocks.history import History
 from graben.mechanics.blocks.loads import Loads
 from graben.mechanics.blocks.model import BlockModel
@@ -51,6 +52,13 @@ class Rising:
                 raise ValueError(f"load {load.name!r}: {error}") from error
             self.loads.add(unit, _course(load))
         self.loads.begin(model, 0.0)
+        self._weight = model.weight.copy()
+        self._digs = sorted(self.programme.excavations, key=lambda dig: dig.time)
+        self.dug = 0
+        self.released: list[tuple[float, float, np.ndarray]] = []  # from, over, forces
+        for dig in self._digs:
+            if not blocks_in(model, np.array(dig.polygon)).any():
+                raise ValueError(f"excavation {dig.name!r}: no block has its middle in its polygon")
 
     def begin(self, progress: Progress) -> None:
         """Bring the body to rest under its weight and steady pressures."""
@@ -68,12 +76,13 @@ class Rising:
         if not history.time:
             m.begin_ledger()
             self._save(save)
-        if not self.loads.direction.any():
+        if not self.loads.direction.any() and not self._digs:
             return
         while rise.load_time < p.end * (1.0 - 1e-9) and not rise.failed:
             if rise.waited == 0:
                 self.carried = m.motion.x.copy()
-            mechanics.look_at(m, rise, self.control, self.loads, p.end, history.reference)
+            stop = self._dig(history, save)
+            mechanics.look_at(m, rise, self.control, self.loads, p.end, history.reference, stop)
             self.looks.append((rise.load_time, rise.settlement, rise.imbalance))
             if rise.failed or rise.load_time >= self.next_save:
                 self._save(save)
@@ -82,6 +91,32 @@ class Rising:
                 min(1.0, rise.load_time / p.end),
                 f"load time {rise.load_time:.4g} s, settlement {rise.settlement:.3g} m{wait}",
             )
+
+    def _dig(self, history: History, save: Callable[[], None]) -> float:
+        """Take out the blocks whose time has come, the state before is saved; returns the time of the next ones."""
+        m, rise = self.model, self.rise
+        while self.dug < len(self._digs):
+            dig = self._digs[self.dug]
+            if dig.time > rise.load_time + 0.5 * m.dt:
+                return dig.time
+            if m.time > history.start_time + history.time[-1]:
+                self._save(save)
+            self.dug += 1
+            forces = excavate(m, blocks_in(m, np.array(dig.polygon)))
+            self.loads.take_off(m.removed[m.bodies.vertex_block])
+            if dig.relax_over > 0.0:
+                self._release(rise.load_time, dig.relax_over, forces)
+            rise.since = rise.load_time
+            self.loads.begin(m, rise.since)
+            rise.imbalance = mechanics.imbalance(m)
+            # What moves now has nothing to do with the speed before.
+            rise.first_speed = 0.0
+        return np.inf
+
+    def _release(self, start: float, over: float, forces: np.ndarray) -> None:
+        """Let forces that stand in for blocks taken out fade away."""
+        self.released.append((start, over, forces))
+        self.loads.add(forces, Course([(start, 1.0), (start + over, 0.0)]), leading=False)
 
     def _save(self, save: Callable[[], None]) -> None:
         self.load_times.append(self.rise.load_time)
@@ -97,6 +132,9 @@ class Rising:
             "load_times": np.array(self.load_times),
             "carried": self.carried,
             "next_save": np.array(self.next_save),
+            "dug": np.array(self.dug),
+            "released": np.array([released[:2] for released in self.released]).reshape(-1, 2),
+            "released_forces": np.array([forces for _, _, forces in self.released]),
             **{f"rise_{k}": np.array(v) for k, v in asdict(self.rise).items()},
         }
 
@@ -105,6 +143,10 @@ class Rising:
         self.looks = [tuple(row) for row in state["looks"].tolist()]
         self.load_times = state["load_times"].tolist()
         self.next_save = float(state["next_save"])
+        self.dug = int(state["dug"])
+        self.loads.take_off(self.model.removed[self.model.bodies.vertex_block])
+        for (start, over), forces in zip(state["released"], state["released_forces"], strict=True):
+            self._release(float(start), float(over), forces)
         self.rise = mechanics.Rise(**{f.name: state[f"rise_{f.name}"].item() for f in fields(mechanics.Rise)})
 
     def arrays(self, history: History) -> dict[str, np.ndarray]:
@@ -141,12 +183,17 @@ class Rising:
         states aside."""
         times = arrays["load_time"][1:-1]
         load = np.zeros((len(times), 2))
-        for force, course in self.loads.patterns:
+        for force, course in self.loads.patterns[: len(self.programme.loads)]:
             load += np.outer([course.at(t) - course.at(0.0) for t in times], force.sum(axis=0))
-        if not load.any():
+        loaded = load.any(axis=1)
+        if not loaded.any():
             return 0.0
-        total = arrays["boundary_force"][1:-1].sum(axis=1) + self.model.weight.sum(axis=0)
-        return float(np.sqrt(np.mean((total**2).sum(axis=1) / (load**2).sum(axis=1))))
+        weight = np.broadcast_to(self._weight.sum(axis=0), load.shape)
+        if "block_removed" in arrays:
+            there = arrays["block_removed"][1:-1, self.model.bodies.vertex_block] == 0
+            weight = there @ self._weight
+        total = arrays["boundary_force"][1:-1].sum(axis=1) + weight
+        return float(np.sqrt(np.mean((total**2).sum(axis=1)[loaded] / (load**2).sum(axis=1)[loaded])))
 
     def headline(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         """Failure load (Pa; null where the end came first), settlement of the loaded ground, error measures."""
@@ -157,10 +204,11 @@ class Rising:
         direction = self.loads.direction
         loaded = direction.any(axis=1)
         sunk = -(self.carried - reference)[loaded, 1] if loaded.any() else np.zeros(1)
-        mean = (direction * (self.carried - reference)).sum() / max(np.hypot(*direction.T).sum(), 1e-300)
+        mean = mechanics.settlement_of(direction, self.carried - reference)
         return {
             "blocks": len(arrays["block_area"]),
-            "failure_load_pa": float(last) if self.rise.failed else None,
+            **({"blocks_removed": int(self.model.removed.sum())} if self._digs else {}),
+            "failure_load_pa": float(last) if self.rise.failed and course.changes else None,
             "failed": self.rise.failed,
             "largest_load_pa": float(largest),
             "settlement_m": float(mean),

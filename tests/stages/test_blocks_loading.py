@@ -1,5 +1,7 @@
 """dem-run on blocks whose loading runs over time: courses, damping; what is refused; stopped runs go on bitwise."""
 
+import json
+
 import numpy as np
 import pytest
 import xarray
@@ -94,6 +96,26 @@ def test_compression_with_unloading_and_rising_confinement(folder):
         assert np.array_equal(two.displacement.values, d.displacement.values)
 
 
+def test_a_force_check_drives_the_pace(folder):
+    steady = ['loading={speed="0.1 mm/s", states=6}', "numerics.steps=1000"]
+    check = [*steady, "numerics.force_check=0.05", "numerics.most_steps=6000"]
+    d, headline = stopped_and_straight(folder / "square.toml", 0.5, check)
+    cost = json.loads(d.attrs["cost"])
+    assert 1000 < cost["loading_steps"] <= 6100
+    assert headline["loading_steps"] == cost["loading_steps"]
+    assert 0.0 < cost["force_check_mean"] < cost["force_check_worst"]
+    # States are those of the scene's time, whatever the steps.
+    assert d.time.values == pytest.approx(np.linspace(0.0, 100.0, 6))
+    top = d.vertex_position.values[:, 1] > 1.999
+    assert d.displacement.values[-1, top, 1].mean() == pytest.approx(-0.1e-3 * 99.5, rel=1e-6)
+    plain = dem_run.run(folder / "square.toml", folder / "plain.nc", overrides=steady)
+    assert "force_check_mean" not in plain
+    assert abs(headline["kinetic_over_stored_energy"]) < plain["kinetic_over_stored_energy"]
+    # Loose tolerance, and leave to be faster: it is.
+    fast = [*steady, "numerics.force_check=0.9", "numerics.least_steps=500"]
+    assert dem_run.run(folder / "square.toml", folder / "fast.nc", overrides=fast)["loading_steps"] < 1000
+
+
 def test_a_pressure_that_falls_again(folder):
     d, headline = stopped_and_straight(folder / "bench.toml", 0.5)
     assert not headline["failed"]
@@ -141,6 +163,9 @@ def test_other_dampings_damp_and_close_the_ledger(folder, damping):
         ("square", 'loading.confining_course=[["0 s","0.5 m"]]', "confining_course", "Pa"),
         ("square", 'numerics.damping="local"', "numerics", "damping_share"),
         ("square", 'numerics.damping="viscous"', "numerics", "damping_coefficient"),
+        ("square", "numerics.force_check=0", "numerics.force_check", "greater than 0"),
+        ("square", "numerics.most_steps=1000", "numerics", "force_check for most_steps"),
+        ("bench", "numerics.force_check=0.1", "", "[loading] only"),
         ("square", "numerics.damping_share=0.5", "numerics", 'damping = "local"'),
         (
             "bench",

@@ -10,6 +10,7 @@ import numpy as np
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.courses import Course
 from graben.mechanics.blocks.model import BlockModel, Damping
+from graben.mechanics.blocks.pace import ForceCheck, Pace
 from graben.mechanics.failure import NumericsFailed
 
 # Rest comes soonest with more damping than a moving wall should feel.
@@ -90,18 +91,20 @@ class Courses:
         """Largest speed in either direction [m/s]."""
         return float(np.abs(self.speed.values).max())
 
-    def drive(self, model: BlockModel, done: int) -> int:
-        """Set wall speed and pressure for what follows step `done`; returns the step of the next point."""
-        d, speed = model.motion.drive, self.speed
+    def next_point(self, done: float) -> float:
+        """Step of the next point after step `done`."""
+        points = [c.next_point(done) for c in (self.speed, self.pressure) if c is not None]
+        return min(points)
+
+    def drive(self, model: BlockModel, done: float, pace: float, top_speed: float) -> None:
+        """Set wall speed (over top_speed) and pressure for steps that follow step `done`, each worth `pace` steps."""
+        d, scale = model.motion.drive, pace / top_speed
         # The speed in the middle of a step moves the wall by just what the course says.
-        slope = speed.slope(done) / self.fastest
-        d[rx.SPEED], d[rx.SPEED_STEP] = speed.at(done) / self.fastest + 0.5 * slope, slope
-        stop = speed.next_point(done)
+        slope = self.speed.slope(done) * pace * scale
+        d[rx.SPEED], d[rx.SPEED_STEP] = self.speed.at(done) * scale + 0.5 * slope, slope
         if self.pressure is not None:
             d[rx.LOAD] = self.pressure.at(done) - self.pressure.values[0]
-            d[rx.LOAD_STEP] = self.pressure.slope(done)
-            stop = min(stop, self.pressure.next_point(done))
-        return int(min(stop, 2**62))
+            d[rx.LOAD_STEP] = self.pressure.slope(done) * pace
 
 
 def compress(
@@ -115,32 +118,42 @@ def compress(
     saved: int = 0,
     courses: Courses | None = None,
     stop_loose: bool = False,
+    paced: tuple[Pace, ForceCheck] | None = None,
 ) -> None:
     """Move the top at `speed` [m/s, negative: down] for `steps` steps; call save(k, model) at `states` states.
 
     State 0 is the start. The speed rises over the first `ramp_share` of the steps. The pressure on the top is
     dropped: the wall now carries it. saved : states that a model brought back from a snapshot has behind it;
     courses : instead of speed and ramp; stop_loose : stop loose blocks every 250 steps, see
-    `BlockModel.calm_loose_blocks`
+    `BlockModel.calm_loose_blocks`; paced : courses are followed as fast as forces allow, in the model's time
     """
-    b = model.bodies
-    top = b.vertex_side[:, rectangle_sides(b.outline).top]
+    b, sides = model.bodies, rectangle_sides(model.bodies.outline)
+    top = b.vertex_side[:, sides.top]
+    if courses is not None:
+        speed = courses.fastest * (1.0 if paced is None else paced[1].fastest)
     if saved == 0:
         model.begin_ledger()
         save(0, model)
         saved = 1
     if saved == 1:
         model.skeleton.steady[top, 1] = model.weight[top, 1]
-        model.hold(top, 1, speed if courses is None else courses.fastest)
+        model.hold(top, 1, speed)
         d = model.motion.drive
         d[rx.SPEED], d[rx.SPEED_STEP] = 0.0, 1.0 / max(1.0, ramp_share * steps)
     for k in range(saved, states):
-        done, end = (round(steps * j / (states - 1)) for j in (k - 1, k))
+        begin, end = (round(steps * j / (states - 1)) for j in (k - 1, k))
+        done = float(begin)
         while done < end:
-            stop = end if courses is None else min(end, courses.drive(model, done))
-            stop = min(stop, done + _LOOSE_EVERY) if stop_loose else stop
-            model.advance(stop - done)
-            done = stop
+            left = (end if courses is None else min(end, courses.next_point(done))) - done
+            wanted, rate = (round(left), 1.0) if paced is None else paced[0].next_steps(paced[1], left)
+            taken = min(wanted, _LOOSE_EVERY) if stop_loose else wanted
+            if courses is not None:
+                courses.drive(model, done, rate, speed)
+            model.advance(taken)
+            done = round(done + left) if taken * rate > left - 1e-9 else done + taken * rate
             if stop_loose:
                 model.calm_loose_blocks()
+            if paced is not None:
+                model.time += (rate - 1.0) * taken * model.dt
+                paced[0].look(model, paced[1], b.vertex_side[:, sides.bottom], top)
         save(k, model)

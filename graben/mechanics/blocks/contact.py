@@ -33,18 +33,22 @@ class Rows(NamedTuple):
 
     edge : (n, 8) int32, the two edges, the nodes where they end, the pair, and the row of Motion.far or -1
     hold : (n, 4) shear stress at both ends [Pa], slip at both ends [m]; mark : (n, 4) int8, state of both ends,
-    whether live, whether intact at the start
+    whether live, whether intact at the start; seat : (n, 2) as of Pairs, or (0, 2)
     """
 
     edge: np.ndarray
     hold: np.ndarray
     mark: np.ndarray
+    seat: np.ndarray
 
 
-def empty_rows(n: int) -> Rows:
-    """Rows for up to n pairs."""
+def empty_rows(n: int, seated: bool = False) -> Rows:
+    """Rows for up to n pairs, with seats or without."""
     return Rows(
-        np.zeros((n, EDGE_COLUMNS), dtype=np.int32), np.zeros((n, 4)), np.zeros((n, MARK_COLUMNS), dtype=np.int8)
+        np.zeros((n, EDGE_COLUMNS), dtype=np.int32),
+        np.zeros((n, 4)),
+        np.zeros((n, MARK_COLUMNS), dtype=np.int8),
+        np.zeros((n if seated else 0, 2)),
     )
 
 
@@ -64,6 +68,8 @@ def fill_row(rows, r, pairs, c, follow, far_row):
         hold[r, k] = pairs.shear[c, k]
         hold[r, 2 + k] = pairs.slip[c, k]
         mark[r, k] = pairs.flag[c, k]
+        if rows.seat.shape[0] > 0:
+            rows.seat[r, k] = pairs.seat[c, k]
     mark[r, LIVE] = pairs.live[c]
     mark[r, INTACT] = pairs.intact[c]
 
@@ -149,7 +155,10 @@ def contact_forces(rows, begin, stop, node, table, joint, deepest, dt, fn, node_
     sums : [friction work, largest overlap], added to; the work that dilation gives back is not friction
     """
     # Taken out of the tuple once: inside the loop each look-up would count references.
-    edge, hold, mark = rows.edge, rows.hold, rows.mark
+    edge, hold, mark, seat = rows.edge, rows.hold, rows.mark, rows.seat
+    seated = seat.shape[0] > 0
+    seat0 = 0.0
+    seat1 = 0.0
     whole_at_start = mark[:, INTACT]
     kn, ks = table[joint, 0], table[joint, 1]
     strengths = (table[joint, 2], table[joint, 3], table[joint, 7], table[joint, 8])
@@ -200,7 +209,10 @@ def contact_forces(rows, begin, stop, node, table, joint, deepest, dt, fn, node_
         h1 = (node[f2, X] - ox) * ty - (node[f2, Y] - oy) * tx
         slip0 = hold[m, 2]
         slip1 = hold[m, 3]
-        if min(h0, h1) > max(0.0, he) and mark[m, INTACT] == 0 and slip0 == 0.0 and slip1 == 0.0:
+        if seated:
+            seat0 = seat[m, 0]
+            seat1 = seat[m, 1]
+        elif min(h0, h1) > max(0.0, he) and mark[m, INTACT] == 0 and slip0 == 0.0 and slip1 == 0.0:
             # Pairs apart that never slid end here, before any root or division.
             if mark[m, LIVE] == 0 or mark[m, 0] != OPEN or mark[m, 1] != OPEN:
                 forget(hold, mark, whole_at_start, m)
@@ -246,11 +258,11 @@ def contact_forces(rows, begin, stop, node, table, joint, deepest, dt, fn, node_
         whole0 = intact and mark0 != BROKEN
         whole1 = intact and mark1 != BROKEN
         tau0, slip0, mark0, sigma0, work0 = _end_law(
-            hold[m, 0], slip0, mark0, whole0, gap0, gain0,
+            hold[m, 0], slip0, mark0, whole0, gap0 - seat0, gain0,
             kn, compliance, strengths, tensile, dilation, limit, closure,
         )  # fmt: skip
         tau1, slip1, mark1, sigma1, work1 = _end_law(
-            hold[m, 1], slip1, mark1, whole1, gap1, gain1,
+            hold[m, 1], slip1, mark1, whole1, gap1 - seat1, gain1,
             kn, compliance, strengths, tensile, dilation, limit, closure,
         )  # fmt: skip
         hold[m, 0] = tau0

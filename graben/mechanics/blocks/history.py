@@ -8,7 +8,18 @@ from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.balance import balance
 from graben.mechanics.blocks.model import BlockModel
 
-ENERGIES = ("kinetic", "strain", "joint", "friction", "plastic", "damping", "boundary", "external", "error")
+ENERGIES = (
+    "kinetic",
+    "strain",
+    "joint",
+    "friction",
+    "plastic",
+    "damping",
+    "boundary",
+    "external",
+    "excavated",
+    "error",
+)
 
 
 class History:
@@ -37,6 +48,7 @@ class History:
                 "contact_state",
                 "contact_set",
                 "loose",
+                "removed",
                 *self.optional,
             )
         }
@@ -66,6 +78,7 @@ class History:
         rows["contact_set"].append(m.pairs.joint[pair])
         loose = m.loose_blocks()
         rows["loose"].append(np.array([[np.count_nonzero(loose), m.kinetic_energy(loose)]]))
+        rows["removed"].append(m.removed.copy())
         if self.optional:
             for name, values in balance(m, rows["zone_stress"][-1], force)._asdict().items():
                 rows[name].append(values)
@@ -131,9 +144,11 @@ class History:
         result.setdefault("zone_stress", np.zeros((len(self.time), 0, 4)))
         energy = np.array(rows["energy"])
         for k, name in enumerate(ENERGIES):
-            # Zones that cannot yield take nothing.
-            if name != "plastic" or "zone_state" in rows:
+            # Zones that cannot yield take nothing, nor does what is not dug.
+            if (name != "plastic" or "zone_state" in rows) and (name != "excavated" or self.model.removed.any()):
                 result["energy_" + name] = energy[:, k]
+        if self.model.removed.any():
+            result["block_removed"] = np.array(rows["removed"]).reshape(len(self.time), -1).astype(np.int8)
         return result
 
 

@@ -97,6 +97,7 @@ class Pairs(NamedTuple):
     key, first, second : (n,); shear : (n, 2) stress at both ends [Pa] on the first edge;
     slip : (n, 2) net plastic sliding [m]; flag : (n, 2) STICK, SLIP, OPEN, BROKEN; live : (n,) 1 once touching;
     intact : (n,) 1 while the joint of the first state holds; joint : (n,) set of joints.
+    seat : (n, 2) closure [m] that both ends have where edges just meet, from in-situ stress; (0, 2): none anywhere.
     """
 
     key: np.ndarray
@@ -108,6 +109,7 @@ class Pairs(NamedTuple):
     live: np.ndarray
     intact: np.ndarray
     joint: np.ndarray
+    seat: np.ndarray = np.empty((0, 2))
 
 
 @kernel(error_model="numpy")
@@ -196,6 +198,8 @@ def contact_state(pairs, follow, node, table, deepest, out, ints, fn):
             if flag == OPEN:
                 continue
             closed_by = table[j, 5] * min(abs(pairs.slip[c, k]), table[j, 6]) - gap
+            if pairs.seat.shape[0] > 0:
+                closed_by += pairs.seat[c, k]
             sigma = kn * closed_by
             energy = 0.5 * sigma * closed_by
             if table[j, 9] > 0.0 and closed_by > 0.0:

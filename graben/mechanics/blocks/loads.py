@@ -19,13 +19,14 @@ class Loads:
         self.patterns: list[tuple[np.ndarray, Course]] = []
         self.direction = np.zeros((vertices, 2))
 
-    def add(self, force: np.ndarray, course: Course) -> None:
+    def add(self, force: np.ndarray, course: Course, *, leading: bool = True) -> None:
         """A load: force (vertices, 2) [N/m] per unit of its course.
 
-        `direction`, along which settlement counts, is the sum of loads at their fastest rates.
+        `direction`, along which settlement counts, is the sum of leading loads at their fastest rates.
         """
         self.patterns.append((force, course))
-        self.direction += course.fastest_rate * force
+        if leading:
+            self.direction += course.fastest_rate * force
 
     def take_off(self, vertices: np.ndarray) -> None:
         """No load acts on these vertices (flags) any more."""

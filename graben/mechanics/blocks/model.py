@@ -127,6 +127,8 @@ class BlockModel:
         self._set_of = np.ascontiguousarray(between, dtype=np.int64)
         self.threads = threads
         self.held = np.zeros((nv, 2), dtype=bool)
+        self.removed = np.zeros(len(bodies.block_area), dtype=bool)
+        self.excavated = 0.0
         self.weight = self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :]
         self.mass_ratio = mass / self.true_mass
         self.skeleton = rx.Skeleton(
@@ -209,6 +211,7 @@ class BlockModel:
             raise NumericsFailed("a position is not finite", step=self.steps_done, advice=_SLOWER)
         slid = float(np.abs(self.pairs.slip).max()) if len(self.pairs.slip) else 0.0
         held = max(j.dilation * min(slid, j.dilation_limit) for j in self.joints)
+        held += max(0.0, float(self.pairs.seat.max())) if len(self.pairs.seat) else 0.0
         cell = max(self.block_size, float(np.sqrt(self._span.prod() / (4.0 * len(s.first)))))
         nx, ny = (int(n) for n in np.maximum(1, np.ceil(self._span / cell)))
         keys = search.find_keys(
@@ -224,6 +227,9 @@ class BlockModel:
             self.pairs.key,
             self.pairs.live,
         )
+        if self.removed.any():
+            gone = self.removed[skin.block]
+            keys = keys[~(gone[keys // len(gone)] | gone[keys % len(gone)])]
         self.pairs = search.carry_history(keys, len(s.first), self.pairs, self._edge_material, self._set_of)
         if first and any(j.tension > 0.0 or j.weakens for j in self.joints):
             self._bond()
@@ -363,7 +369,10 @@ class BlockModel:
 
     def zone_stress(self) -> np.ndarray:
         """Cauchy stress (zones, 4) as xx, yy, zz, xy [Pa]."""
-        return self._zone_state()[0]
+        stress = self._zone_state()[0]
+        if self.removed.any():
+            stress[self.removed[self.bodies.zone_block]] = 0.0
+        return stress
 
     def state_of_blocks(self) -> dict[str, np.ndarray]:
         """What the law of the zones leaves at each state, named as in the artifact."""
@@ -444,8 +453,9 @@ class BlockModel:
             "damping": float(t[rx.DAMPED]),
             "boundary": float(t[rx.WALL_WORK]),
             "external": float(t[rx.LOAD_WORK]),
+            "excavated": self.excavated,
         }
-        gone = ("kinetic", "strain", "joint", "friction", "plastic", "damping")
+        gone = ("kinetic", "strain", "joint", "friction", "plastic", "damping", "excavated")
         e["error"] = e["boundary"] + e["external"] - sum(e[name] for name in gone)
         return e
 

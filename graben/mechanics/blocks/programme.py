@@ -171,7 +171,7 @@ def look_at(
     if rise.load_time > point - 0.5 * model.dt:
         rise.since = rise.load_time = point
         loads.begin(model, point)
-    settlement = _settlement(loads.direction, m.x - reference)
+    settlement = settlement_of(loads.direction, m.x - reference)
     rise.speed = (settlement - rise.settlement) / (chunk * model.dt)
     rise.settlement = settlement
     rise.imbalance = imbalance(model)
@@ -187,7 +187,7 @@ def look_at(
     rise.failed = collapsing or rise.waited >= (control.patience if sinking else 4 * control.patience)
 
 
-def _settlement(direction: np.ndarray, moved: np.ndarray) -> float:
+def settlement_of(direction: np.ndarray, moved: np.ndarray) -> float:
     """Displacement along the loads [m]; where no load changes, the mean distance that vertices went."""
     whole = float(np.hypot(*direction.T).sum())
     return float((direction * moved).sum() / whole) if whole > 0.0 else float(np.hypot(*moved.T).mean())

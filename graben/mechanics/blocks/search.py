@@ -115,6 +115,8 @@ def carry_history(keys, nodes, old, edge_material, set_of):
     live = np.zeros(n, dtype=np.int8)
     whole = np.zeros(n, dtype=np.int8)
     joint = np.zeros(n, dtype=np.int16)
+    seated = old.seat.shape[0] > 0
+    seat = np.zeros((n if seated else 0, 2))
     m = 0
     for k in range(n):
         first[k] = keys[k] // nodes
@@ -127,9 +129,11 @@ def carry_history(keys, nodes, old, edge_material, set_of):
                 shear[k, d] = old.shear[m, d]
                 slip[k, d] = old.slip[m, d]
                 flag[k, d] = old.flag[m, d]
+                if seated:
+                    seat[k, d] = old.seat[m, d]
             live[k] = old.live[m]
             whole[k] = old.intact[m]
-    return Pairs(keys, first, second, shear, slip, flag, live, whole, joint)
+    return Pairs(keys, first, second, shear, slip, flag, live, whole, joint, seat)
 
 
 def no_pairs() -> Pairs:

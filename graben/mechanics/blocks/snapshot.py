@@ -6,6 +6,7 @@ from operator import attrgetter
 
 import numpy as np
 
+from graben.mechanics.blocks.contact import empty_rows
 from graben.mechanics.blocks.model import BlockModel
 
 _GROUPS = ("motion", "pairs", "skeleton", "skeleton.zones")
@@ -20,6 +21,8 @@ def take(model: BlockModel) -> dict[str, np.ndarray]:
             if isinstance(value, np.ndarray):
                 result[f"{group}.{name}"] = value.copy()
     result["held"] = model.held.copy()
+    result["removed"] = model.removed.copy()
+    result["excavated"] = np.array(model.excavated)
     result["time"] = np.array(model.time)
     for name in _COUNTERS:
         result[name] = np.array(getattr(model, name))
@@ -45,7 +48,12 @@ def bring_back(model: BlockModel, state: dict[str, np.ndarray]) -> None:
             model.skeleton = model.skeleton._replace(zones=own._replace(**found))
         else:
             setattr(model, group, own._replace(**found))
+    rows = empty_rows(len(model.pairs.key), len(model.pairs.seat) > 0)
+    model.motion = model.motion._replace(rows=rows)
     model.held[:] = state["held"]
+    model.removed[:] = state["removed"]
+    model.weight[model.removed[model.bodies.vertex_block]] = 0.0
+    model.excavated = float(state["excavated"])
     model.time = float(state["time"])
     for name in _COUNTERS:
         setattr(model, name, int(state[name]))

@@ -34,7 +34,7 @@ def fresh_watch(pairs: Pairs, parts: Parts, node: np.ndarray, sets: int = 1) -> 
     blocks = int(parts.block[-1])
     return {
         "start": start,
-        "rows": empty_rows(n),
+        "rows": empty_rows(n, len(pairs.seat) > 0),
         "turn": np.zeros((count, sets + 1), dtype=np.int64),
         "kind": np.full(n, AWAY, dtype=np.int8),
         "wake": np.full(n, -1.0),
@@ -154,6 +154,8 @@ def look_again(p, parts, pairs, follow, node, near, dilation, watch):
         if moved < wake[c]:
             continue
         held = dilation * max(abs(slip[c, 0]), abs(slip[c, 1]))
+        if pairs.seat.shape[0] > 0:
+            held += max(pairs.seat[c, 0], pairs.seat[c, 1])
         now, room = safe_motion(first[c], second[c], follow[second[c]], node, held)
         if now == FACING and (flag[c, 0] < OPEN or flag[c, 1] < OPEN):
             now = CLOSED

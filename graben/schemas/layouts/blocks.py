@@ -132,6 +132,16 @@ LAYOUT = Layout(
         "energy_boundary": _energy("work of moving walls since the first state"),
         "energy_external": _energy("work of pressures and gravity since the first state"),
         "energy_error": _energy("work done on the blocks less everything accounted for"),
+        "energy_excavated": Variable(
+            _T, "J m-1", "energy that left with blocks taken out, where there are such", optional=True
+        ),
+        "block_removed": Variable(
+            ("time", "block"),
+            "1",
+            "1 once the block is taken out: it bears nothing and stays where it was",
+            dtype="i1",
+            optional=True,
+        ),
         "load_time": _rising(_T, "s", "time for which pressures have risen, waiting not counted"),
         "look_load_time": _rising(_L, "s", "time for which pressures had risen, waiting not counted"),
         "look_settlement": _rising(_L, "m", "displacement along the rising pressures, mean over the loaded length"),

@@ -9,7 +9,7 @@ from pydantic import model_validator
 
 from graben.schemas.quantities import Angle, Density, JointStiffness, Length, Pressure, key
 from graben.schemas.scene import InputFile, Model, Scene
-from graben.schemas.scenes.blocks_loading import Loading, Numerics, Point, Programme
+from graben.schemas.scenes.blocks_loading import InSitu, Loading, Numerics, Point, Programme
 
 
 class Domain(Model):
@@ -179,6 +179,7 @@ class BlocksScene(Scene):
     tessellation: Tessellation = key(default_factory=Tessellation, description="blocks")
     rock: Rock = key(default_factory=Rock, description="blocks' rock")
     joints: Joints = key(default_factory=Joints, description="joints")
+    in_situ: InSitu | None = key(None, "stress in blocks and joints from the start; left out: none")
     loading: Loading = key(default_factory=Loading, description="biaxial compression of a rectangle")
     programme: Programme | None = key(
         None, "weight and rising pressures on any outline, instead of [loading]; the defaults are Y's slope, 4.5"
@@ -205,6 +206,13 @@ class BlocksScene(Scene):
             faults.append(f"joints.sets of the {len(t.sets)} sets in [[tessellation.sets]] (found {max(numbers)})")
         if self.rock.zones == "rigid" and t.zone_edge is not None:
             faults.append('no tessellation.zone_edge, because rock.zones = "rigid"')
+        if self.rock.zones == "rigid":
+            dug = self.programme is not None and bool(self.programme.excavations)
+            asked = {"in_situ": self.in_situ, "numerics.force_check": self.numerics.force_check}
+            faults += [
+                f'no {name}, because rock.zones = "rigid"' for name, value in asked.items() if value is not None
+            ]
+            faults += ['no programme.excavations, because rock.zones = "rigid"'] if dug else []
         if self.rock.zones == "rigid" and self.output.balance:
             faults.append('no output.balance, because rock.zones = "rigid" (stress comes from the forces)')
         if t.rounding > 0.25 * t.edge:
@@ -216,7 +224,11 @@ class BlocksScene(Scene):
         strain = self.loading.largest_travel / d.height
         if self.programme is not None and "loading" in self.model_fields_set:
             faults.append("either [loading] or [programme]")
-        elif self.programme is None and d.outline is not None:
+        if self.programme is not None and self.numerics.force_check is not None:
+            faults.append("numerics.force_check with [loading] only (a programme waits by programme.calm)")
+        if self.in_situ is not None and self.in_situ.k0 is not None and self.programme is None:
+            faults.append("in_situ.k0 with a [programme], which has weight")
+        if self.programme is None and d.outline is not None:
             faults.append("[programme] with a domain.outline ([loading] compresses the rectangle)")
         elif self.programme is None and strain > 0.5:
             faults.append(f"loading that shortens the domain by at most one half (found {strain:.3g})")

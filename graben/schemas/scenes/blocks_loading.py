@@ -13,6 +13,7 @@ from graben.schemas.quantities import (
     Length,
     Pressure,
     PressureRate,
+    PressureSlope,
     Speed,
     Time,
     key,
@@ -127,6 +128,42 @@ class Load(Model):
         return self
 
 
+class Excavation(Model):
+    """Blocks taken out of the body while it is loaded."""
+
+    name: str = key("excavation", "name, for messages")
+    polygon: list[Point] = key(..., "corner points: blocks whose middle lies in it then go", min_length=3)
+    time: Time = key("0 s", "time of loading at which they go", ge=0)
+    relax_over: Time = key(
+        "0 s", "time of loading over which the forces that they bore fade away; 0 s: they are gone at once", ge=0
+    )
+
+
+class InSitu(Model):
+    """Stress from the start, in blocks and joints; tension is positive, and szz is that of plane strain."""
+
+    sxx: Pressure = key("0 Pa", "horizontal stress at the level")
+    syy: Pressure = key("0 Pa", "vertical stress at the level")
+    sxy: Pressure = key("0 Pa", "shear stress at the level")
+    sxx_rise: PressureSlope = key("0 Pa/m", "rise of the horizontal stress per metre upwards")
+    syy_rise: PressureSlope = key("0 Pa/m", "rise of the vertical stress per metre upwards")
+    sxy_rise: PressureSlope = key("0 Pa/m", "rise of the shear stress per metre upwards")
+    level: Length | None = key(None, "height at which the stresses hold; left out: the top of the domain")
+    k0: float | None = key(
+        None,
+        "horizontal over vertical stress; the vertical one is then the weight of the rock below the level, plus syy "
+        "at the level",
+        ge=0,
+    )
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> InSitu:
+        both = self.model_fields_set & {"sxx", "sxx_rise", "syy_rise", "sxy", "sxy_rise"}
+        if self.k0 is not None and both:
+            raise ValueError(f"either k0 or {', '.join(sorted(both))}")
+        return self
+
+
 class Programme(Model):
     """Weight and steady pressures until rest, then pressures that rise until the rock fails; instead of [loading]."""
 
@@ -134,6 +171,7 @@ class Programme(Model):
     vertical: Acceleration = key("-9.81 m/s^2", "gravity along y (upwards positive)")
     supports: list[Support] = key(_SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)")
     loads: list[Load] = key(_SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)")
+    excavations: list[Excavation] = key([], "blocks taken out at a time (repeatable)")
     end: Time = key("100 s", "time of rise after which the run ends without failure (waiting not counted)", gt=0)
     save_every: Time = key("4 s", "time of rise between saved states", gt=0)
     calm: float = key(
@@ -160,6 +198,19 @@ class Numerics(Model):
 
     steps: int | None = key(
         None, "steps of loading (of a programme's end): fewer means heavier scaled masses, so more inertia", gt=100
+    )
+    force_check: float | None = key(
+        None,
+        "loading slows down and speeds up so that lateral stress inside over applied, and bottom over top reaction, "
+        "stay this close to 1; left out: the same speed throughout",
+        gt=0,
+        lt=1,
+    )
+    least_steps: int | None = key(
+        None, "force_check: no faster than so many steps for the whole loading; left out: steps", gt=100
+    )
+    most_steps: int | None = key(
+        None, "force_check: no slower than so many steps for the whole loading; left out: 8 times steps", gt=100
     )
     damping: Literal["adaptive", "local", "viscous"] = key(
         "adaptive",
@@ -194,6 +245,11 @@ class Numerics(Model):
         for name, kind in kinds.items():
             if self.damping == kind and getattr(self, name) is None:
                 faults.append(f'{name}, because damping = "{kind}"')
+        limits = {"least_steps": self.least_steps, "most_steps": self.most_steps}
+        if self.force_check is None:
+            faults += [f"force_check for {name}" for name, value in limits.items() if value is not None]
+        elif None not in limits.values() and self.least_steps > self.most_steps:  # type: ignore[operator]
+            faults.append(f"least_steps of at most most_steps (found {self.least_steps} and {self.most_steps})")
         if faults:
             raise ValueError("; ".join(faults))
         return self

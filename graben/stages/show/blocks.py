@@ -13,11 +13,15 @@ def draw(dataset: Any, figure: Any) -> None:
 
     left, right = figure.subplots(1, 2, width_ratios=(1.4, 1.0))
     x = dataset.vertex_position.values + dataset.displacement.values[-1]
+    there = np.ones(dataset.sizes["block"], dtype=bool)
+    if "block_removed" in dataset:
+        there = dataset.block_removed.values[-1] == 0
     ends = np.cumsum(dataset.block_corner_count.values)[:-1]
-    rings = np.split(x[dataset.block_corner.values], ends)
+    rings = [ring for ring, kept in zip(np.split(x[dataset.block_corner.values], ends), there, strict=True) if kept]
     rigid = "block_stress" in dataset
-    stress = -(dataset.block_stress if rigid else dataset.zone_stress).values[-1, :, 1] / 1e6
-    cells = rings if rigid else x[dataset.zone_vertex.values]
+    drawn = there if rigid else there[dataset.zone_block.values]
+    stress = -(dataset.block_stress if rigid else dataset.zone_stress).values[-1, drawn, 1] / 1e6
+    cells = rings if rigid else x[dataset.zone_vertex.values[drawn]]
     field = PolyCollection(cells, array=stress, cmap="viridis", edgecolors="none")
     field.set_clim(0.0, max(float(np.percentile(stress, 97)), 1e-6))
     left.add_collection(field)
@@ -47,11 +51,11 @@ def _rising(dataset: Any, axis: Any) -> None:
     """Settlement against the time for which pressures rose; the surface at the last load carried, below."""
     axis.plot(dataset.look_settlement.values * 1e3, dataset.look_load_time.values)
     axis.plot(0.0, 0.0, ".", color="none")
-    axis.set_xlabel("settlement of the loaded ground, mm")
-    axis.set_ylabel("time for which pressures rose, s")
+    axis.set_xlabel("settlement of the loaded ground (where no load changes: mean displacement), mm")
+    axis.set_ylabel("time of loading, waiting not counted, s")
     low = axis.inset_axes((0.42, 0.1, 0.55, 0.4))
     x = dataset.vertex_position.values[dataset.surface_vertex.values]
-    level = x[:, 1] > x[:, 1].max() - 0.05 * np.ptp(x[:, 1])
+    level = x[:, 1] > x[:, 1].max() - 0.05 * np.ptp(dataset.outline.values[:, 1])
     low.plot(x[level, 0], dataset.surface_carried_displacement.values[level, 1] * 1e3, ".", ms=2, color="0.2")
     low.set_xlabel("x, m", fontsize=8)
     low.set_title("top surface at the last load carried, mm", fontsize=8)
