@@ -26,7 +26,8 @@ def blocks(kind):
     if kind == "refined":
         return build_bodies(voronoi_blocks(SQUARE, 0.9, seed=3), 0.3)
     sets = [JointSet(0.3, 0.7), JointSet(1.9, 0.6, 0.5)]
-    return build_bodies(mend(cut_by_sets(SQUARE, sets, 2), shortest=0.05, thinnest=0.05))
+    shapes = [ring for ring, _ in cut_by_sets(SQUARE, sets, 2)]
+    return build_bodies(mend(shapes, shortest=0.05, thinnest=0.05))
 
 
 def standing(kind, joint=JOINT, gravity=(0.0, 0.0), **more):
