@@ -104,7 +104,13 @@ def read_run(path: Path) -> Run:
     removed = np.asarray(
         data["block_removed"].values > 0 if "block_removed" in data else np.zeros((0, 0), dtype=bool)
     )
-    return Run(path, history, float(data["confining_stress"]), int(data.attrs.get("seed", -1)), removed.any(axis=0))
+    return Run(
+        path,
+        history,
+        float(data["confining_stress"]),
+        int(data.attrs.get("seed", -1)),
+        np.asarray(removed.any(axis=0)),
+    )
 
 
 def _floats(data: xarray.Dataset, name: str) -> np.ndarray:
