@@ -1,8 +1,9 @@
-"""Speed of the block model: zone-steps per second and cost per block, one thread, as JSON lines on stdout.
+"""Speed of the block model: zone-steps per second and cost per block as JSON lines on stdout.
 
 Voronoi granite of growing size, squeezed so that joints slide, contacts and their search included. Options:
---sizes EDGE ... (domain edges in m: 10 20), --steps N (2000), --threads N ... (1), --features (what each feature of
-joints costs: median of five rounds, in turn, of runs with it and without).
+--sizes EDGE ... (domain edges in m: 10 20), --dilations DEG ... (0 5), --steps N (2000), --threads N ... (1; what
+several gain over the first is a line of its own), --features (what each feature of joints costs: median of five
+rounds, in turn, of runs with it and without).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from graben.mechanics.blocks.compression import consolidate
 from graben.mechanics.blocks.joints import Joint
 from graben.mechanics.blocks.model import BlockModel
 from graben.mechanics.blocks.tessellation import voronoi_blocks
+from graben.mechanics.blocks.watch import AWAY, CLOSED
 
 PLAIN = Joint(1e10, 1e9, np.tan(np.radians(32)), 1e5, 0.0, 0.0, np.inf)
 FEATURES = {
@@ -76,9 +78,40 @@ def feature_costs(size: float, steps: int) -> None:
         print(json.dumps(line), flush=True)
 
 
+def step_costs(size: float, dilation: float, steps: int, threads: list[int]) -> None:
+    """Cost of a step of one model, with each number of threads in turn, five rounds; then what threads gain."""
+    model = granite(size, dilation)
+    model.advance(steps)
+    zones, blocks = len(model.bodies.zone_block), len(model.bodies.block_area)
+    spent = np.zeros((5, len(threads), 2))
+    before = model.rebuilds
+    for spell in spent:
+        for seen, model.threads in zip(spell, threads, strict=True):
+            seen[:] = time.perf_counter(), time.process_time()
+            model.advance(steps // 5)
+            seen[:] = time.perf_counter() - seen[0], time.process_time() - seen[1]
+    pairs = len(model.pairs.key)
+    kinds = np.bincount(model.motion.kind, minlength=AWAY + 1)
+    for k, count in enumerate(threads):
+        wall, cpu = np.median(spent[:, k], axis=0) / (steps // 5)
+        line = {"benchmark": "blocks", "blocks": blocks, "zones": zones, "dilation_deg": dilation, "steps": steps}
+        line |= {"threads": count, "wall_us_per_step": round(1e6 * wall, 1), "cpu_us_per_step": round(1e6 * cpu, 1)}
+        line |= {"zone_steps_per_cpu_s": round(zones / cpu), "ns_per_block_step": round(1e9 * cpu / blocks, 1)}
+        line |= {"candidates": pairs, "closed": int(kinds[CLOSED]), "awake": int(kinds[:AWAY].sum())}
+        line |= {"contact_searches": model.rebuilds - before}
+        line |= {"machine": platform.machine(), "python": platform.python_version()}
+        print(json.dumps(line), flush=True)
+    for k, count in enumerate(threads[1:], start=1):
+        wall, cpu = np.median(spent[:, k] / spent[:, 0], axis=0)
+        line = {"benchmark": "blocks threads", "blocks": blocks, "dilation_deg": dilation, "threads": count}
+        line |= {"speedup": round(1.0 / wall, 3), "cpu_over_one_thread": round(cpu, 3)}
+        print(json.dumps(line), flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sizes", type=float, nargs="+", default=[10.0, 20.0])
+    parser.add_argument("--dilations", type=float, nargs="+", default=[0.0, 5.0])
     parser.add_argument("--steps", type=int, default=2000)
     parser.add_argument("--threads", type=int, nargs="+", default=[1])
     parser.add_argument("--features", action="store_true")
@@ -87,35 +120,8 @@ def main() -> None:
         feature_costs(options.sizes[0], options.steps)
         return
     for size in options.sizes:
-        for dilation, threads in ((d, t) for d in (0.0, 5.0) for t in options.threads):
-            model = granite(size, dilation, threads=threads)
-            model.advance(options.steps)
-            searches, wall, cpu = model.rebuilds, time.perf_counter(), time.process_time()
-            model.advance(options.steps)
-            wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-            zones, blocks = len(model.bodies.zone_block), len(model.bodies.block_area)
-            print(
-                json.dumps(
-                    {
-                        "benchmark": "blocks",
-                        "blocks": blocks,
-                        "zones": zones,
-                        "dilation_deg": dilation,
-                        "steps": options.steps,
-                        "wall_s": round(wall, 3),
-                        "cpu_s": round(cpu, 3),
-                        "zone_steps_per_cpu_s": round(zones * options.steps / cpu),
-                        "ns_per_block_step": round(1e9 * cpu / options.steps / blocks, 1),
-                        "candidates": len(model.pairs.key),
-                        "active": int((model.motion.turn[:, -1] - model.motion.turn[:, 0]).sum()),
-                        "threads": threads,
-                        "contact_searches": model.rebuilds - searches,
-                        "machine": platform.machine(),
-                        "python": platform.python_version(),
-                    }
-                ),
-                flush=True,
-            )
+        for dilation in options.dilations:
+            step_costs(size, dilation, options.steps, options.threads)
 
 
 if __name__ == "__main__":
