@@ -2,8 +2,8 @@
 
 Voronoi granite of growing size, squeezed so that joints slide, contacts and their search included. Options:
 --sizes EDGE ... (domain edges in m: 10 20), --dilations DEG ... (0 5), --steps N (2000), --threads N ... (1; what
-several gain over the first is a line of its own), --features (what each feature of joints costs: median of five
-rounds, in turn, of runs with it and without).
+several gain over the first is a line of its own), --features (what each feature of joints and each law of zones
+costs: median of twelve rounds, in turn, of runs with it and without).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.compression import consolidate
 from graben.mechanics.blocks.joints import Joint
 from graben.mechanics.blocks.model import BlockModel
+from graben.mechanics.blocks.plastic_zones import ELASTIC, PlasticZones, Strength
 from graben.mechanics.blocks.tessellation import voronoi_blocks
 from graben.mechanics.blocks.watch import AWAY, CLOSED
 
@@ -34,9 +35,17 @@ FEATURES = {
     "stiffening": (PLAIN._replace(closure=1e-3),),
     "two sets": (PLAIN, PLAIN),
 }
+# Y's rock, in which next to nothing yields, and one so weak that a third of it does.
+LAWS: dict[str, dict] = {
+    "rigid blocks": {"rigid": True},
+    "yielding zones": {"strength": Strength(np.radians(51), 55.1e6, 11.7e6)},
+    "yielding zones, weak": {"strength": Strength(np.radians(40), 2e6, 0.5e6, np.radians(5))},
+}
 
 
-def granite(size: float, dilation: float, joints: tuple[Joint, ...] = (), threads: int = 1) -> BlockModel:
+def granite(
+    size: float, dilation: float, joints: tuple[Joint, ...] = (), threads: int = 1, **law: object
+) -> BlockModel:
     """A square of Voronoi granite after consolidation, its top moving down; with several sets, edges take turns."""
     outline = size * np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
     bodies = build_bodies(voronoi_blocks(outline, 0.5, seed=1))
@@ -52,6 +61,7 @@ def granite(size: float, dilation: float, joints: tuple[Joint, ...] = (), thread
         rounding=0.05,
         dt=2e-3,
         threads=threads,
+        **law,
     )
     consolidate(model, -0.5e6, -0.25e6, tolerance=5e-2)
     # The same motion per step whatever the size: step costs compare.
@@ -63,6 +73,7 @@ def granite(size: float, dilation: float, joints: tuple[Joint, ...] = (), thread
 def feature_costs(size: float, steps: int) -> None:
     """Step cost with each feature on, over that of plain joints."""
     models = {name: granite(size, 0.0, joints) for name, joints in FEATURES.items()}
+    models |= {name: granite(size, 0.0, (PLAIN,), **law) for name, law in LAWS.items()}
     spent: dict[str, list[float]] = {name: [] for name in models}
     for _ in range(5):
         for name, model in models.items():
@@ -74,6 +85,8 @@ def feature_costs(size: float, steps: int) -> None:
         ratio = float(np.median(np.array(spent[name]) / plain))
         blocks = len(model.bodies.block_area)
         line = {"benchmark": "blocks features", "feature": name, "blocks": blocks, "cost_over_plain": round(ratio, 3)}
+        if isinstance(model.skeleton.zones, PlasticZones):
+            line["yielded"] = round(float((model.skeleton.zones.flag != ELASTIC).mean()), 3)
         line["ns_per_block_step"] = round(1e9 * float(np.median(spent[name])) / steps / blocks, 1)
         print(json.dumps(line), flush=True)
 

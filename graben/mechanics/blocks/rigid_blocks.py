@@ -209,6 +209,7 @@ def move_rigid_blocks(blocks, begin, stop, still, still_end, s, m, load, alpha, 
     """
     x, v, joint, held = m.x, m.v, m.joint_force, m.zone_force
     steady, rising, first, place, inertia = s.steady, s.rising, blocks.first, blocks.place, blocks.inertia
+    arms, shares, rows = blocks.arm, blocks.share, s.still
     slow = 1.0 - 0.5 * alpha * dt
     fast = 1.0 / (1.0 + 0.5 * alpha * dt)
     old, new, mean, pull, force = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
@@ -243,7 +244,7 @@ def move_rigid_blocks(blocks, begin, stop, still, still_end, s, m, load, alpha, 
             new[d] = (old[d] * slow + (force[d] - drag) * dt / mass) * fast
             mean[d] = 0.5 * (old[d] + new[d])
         mine = still
-        while still < still_end and s.still[still, 0] < first[b + 1]:
+        while still < still_end and rows[still, 0] < first[b + 1]:
             still += 1
         if still > mine:
             wall_work += _constrain(blocks, b, mine, still, s, m, speed, dt, old, force, new, mean, pull, work)
@@ -268,10 +269,10 @@ def move_rigid_blocks(blocks, begin, stop, still, still_end, s, m, load, alpha, 
         for i in range(first[b], first[b + 1]):
             ox = x[i, 0] - cx
             oy = x[i, 1] - cy
-            share = blocks.share[i]
+            share = shares[i]
             held[i, 0] = share * (force[0] - twist * oy) - joint[i, 0] - (steady[i, 0] + load * rising[i, 0])
             held[i, 1] = share * (force[1] + twist * ox) - joint[i, 1] - (steady[i, 1] + load * rising[i, 1])
-            ux, uy = blocks.arm[i, 0], blocks.arm[i, 1]
+            ux, uy = arms[i, 0], arms[i, 1]
             rx = c * ux - t * uy
             ry = t * ux + c * uy
             v[i, 0] = new[0] - 0.5 * spin * (oy + ry)
