@@ -75,14 +75,14 @@ def feature_costs(size: float, steps: int) -> None:
     models = {name: granite(size, 0.0, joints) for name, joints in FEATURES.items()}
     models |= {name: granite(size, 0.0, (PLAIN,), **law) for name, law in LAWS.items()}
     spent: dict[str, list[float]] = {name: [] for name in models}
-    for _ in range(5):
+    for _ in range(12):
         for name, model in models.items():
             cpu = time.process_time()
             model.advance(steps)
             spent[name].append(time.process_time() - cpu)
-    plain = np.array(spent["plain"])
+    plain = np.median(spent["plain"])
     for name, model in models.items():
-        ratio = float(np.median(np.array(spent[name]) / plain))
+        ratio = float(np.median(spent[name]) / plain)
         blocks = len(model.bodies.block_area)
         line = {"benchmark": "blocks features", "feature": name, "blocks": blocks, "cost_over_plain": round(ratio, 3)}
         if isinstance(model.skeleton.zones, PlasticZones):
