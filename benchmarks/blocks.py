@@ -35,7 +35,7 @@ FEATURES = {
     "stiffening": (PLAIN._replace(closure=1e-3),),
     "two sets": (PLAIN, PLAIN),
 }
-# Y's rock, in which next to nothing yields, and one so weak that a third of it does.
+# Y's rock, in which next to nothing yields, and one so weak that a seventh of it does.
 LAWS: dict[str, dict] = {
     "rigid blocks": {"rigid": True},
     "yielding zones": {"strength": Strength(np.radians(51), 55.1e6, 11.7e6)},
