@@ -51,7 +51,7 @@ def _rising(dataset: Any, axis: Any) -> None:
     """Settlement against the time for which pressures rose; the surface at the last load carried, below."""
     axis.plot(dataset.look_settlement.values * 1e3, dataset.look_load_time.values)
     axis.plot(0.0, 0.0, ".", color="none")
-    axis.set_xlabel("settlement of the loaded ground (where no load changes: mean displacement), mm")
+    axis.set_xlabel("settlement of the loaded ground, mm\n(mean displacement where no load changes)")
     axis.set_ylabel("time of loading, waiting not counted, s")
     low = axis.inset_axes((0.42, 0.1, 0.55, 0.4))
     x = dataset.vertex_position.values[dataset.surface_vertex.values]
