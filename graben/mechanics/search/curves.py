@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cache
+from itertools import pairwise
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -262,9 +264,23 @@ class CurveFit:
             )  # fmt: skip
 
         if self.workers > 1 and len(values) > 1:
-            # the kernel releases the interpreter; small parts, since a candidate that fails costs more than others
-            edges = np.linspace(0, len(values), min(3 * self.workers, len(values)) + 1).astype(int)
-            list(_threads(self.workers).map(run, edges[:-1], edges[1:]))
+            # the kernel releases the interpreter; small parts, taken in turn: one that fails costs more than others
+            edges = np.linspace(0, len(values), min(4 * self.workers, len(values)) + 1).astype(int)
+            parts = pairwise(edges)
+            lock = Lock()
+
+            def share() -> None:
+                while True:
+                    with lock:
+                        part = next(parts, None)
+                    if part is None:
+                        return
+                    run(*part)
+
+            others = [_threads(self.workers).submit(share) for _ in range(self.workers - 1)]
+            share()
+            for other in others:
+                other.result()
         else:
             run(0, len(values))
         strain[..., 3:] *= 0.5
