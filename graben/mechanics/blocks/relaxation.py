@@ -220,7 +220,9 @@ def _worst(column):
     worst = column[0]
     for p in range(column.shape[0]):
         if not column[p] <= worst:
-            return column[p] if column[p] > worst else np.inf
+            if not column[p] > worst:
+                return np.inf
+            worst = column[p]
     return worst
 
 
