@@ -14,8 +14,8 @@ from graben.cli.options import FILE, Session, Tool, session_options
 @session_options
 def main(session: Session, files: tuple[Path, ...]) -> None:
     """Check scene files (.toml) and artifacts (.nc); report every fault. Exit code 2 if there is one."""
+    from graben.errors import BadInput
     from graben.schemas.check import check
-    from graben.schemas.faults import BadInput
 
     faults = [fault for file in files for fault in check(file)]
     if faults:

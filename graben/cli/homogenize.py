@@ -10,7 +10,7 @@ from graben.cli.options import FILE, Session, Tool, stage_options
 
 
 def _length(text: str, option: str) -> float:
-    from graben.schemas.faults import BadInput, Fault
+    from graben.errors import BadInput, Fault
     from graben.schemas.quantities import to_si
 
     try:
@@ -20,7 +20,7 @@ def _length(text: str, option: str) -> float:
 
 
 def _point(text: str, option: str) -> tuple[float, float]:
-    from graben.schemas.faults import BadInput, Fault
+    from graben.errors import BadInput, Fault
 
     parts = text.split(",")
     if len(parts) != 2:

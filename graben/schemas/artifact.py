@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from graben.schemas.faults import BadInput, Fault, NotFinite
+from graben.errors import BadInput, Fault, NotFinite
 from graben.schemas.files import whole_file
 from graben.schemas.provenance import Record
 

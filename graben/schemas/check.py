@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from graben.errors import BadInput, Fault
 from graben.schemas.artifact import check_artifact
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.kinds import SCENES
 from graben.schemas.scene import load_scene
 

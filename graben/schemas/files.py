@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from graben.schemas.faults import BadInput, Fault
+from graben.errors import BadInput, Fault
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.schemas.faults import BadInput, Fault
+from graben.errors import BadInput, Fault
 
 GEOJSON = (".geojson", ".json")
 

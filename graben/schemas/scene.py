@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, PrivateAttr, ValidationError, ValidationInfo
 
-from graben.schemas.faults import BadInput, Fault
+from graben.errors import BadInput, Fault
 from graben.schemas.quantities import key
 
 Fidelity = Literal["draft", "standard", "reference"]

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import xarray
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.averaging.history import Contacts, History
 from graben.mechanics.averaging.outline import domain_outline
 from graben.mechanics.averaging.rev import Circle, Rev
 from graben.schemas.artifact import read_artifact
-from graben.schemas.faults import BadInput, Fault
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from graben.errors import BadInput, Fault, NumericsFailed
 from graben.mechanics.blocks import snapshot
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.history import History
@@ -16,9 +17,7 @@ from graben.mechanics.blocks.mending import mend
 from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.blocks.plastic_zones import Strength
 from graben.mechanics.blocks.tessellation import Tessellation, voronoi_blocks, without
-from graben.mechanics.failure import NumericsFailed
 from graben.schemas.artifact import write_artifact
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.layouts.blocks import LAYOUT
 from graben.schemas.polygon_file import read_polygons
 from graben.schemas.scenes.blocks import BlocksScene

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.blocks import snapshot
 from graben.mechanics.blocks.history import History
 from graben.mechanics.blocks.model import BlockModel
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import whole_file
 from graben.schemas.scene import Scene
 

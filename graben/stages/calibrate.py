@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.materials.laws import LAWS
 from graben.mechanics.search.first_state import settle
 from graben.mechanics.search.identifiability import identify
 from graben.schemas.artifact import write_artifact
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import refuse_existing
 from graben.schemas.layouts.calibration import LAYOUT
 from graben.schemas.scene import load_scene

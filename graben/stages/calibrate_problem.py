@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.materials.laws import LAWS
 from graben.mechanics.search.curves import Curve, CurveFit, Weights
 from graben.mechanics.search.multistart import Found, Plan, search
 from graben.mechanics.search.objective import Objective, Priors
 from graben.mechanics.search.space import Box
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.stages.calibrate_state import State
 from graben.stages.calibrate_workers import Sent

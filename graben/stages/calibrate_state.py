@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 import graben
+from graben.errors import BadInput, Fault
 from graben.mechanics.search.multistart import Help, Start
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import whole_file
 from graben.schemas.provenance import sha256_of
 from graben.stages.calibrate_workers import Workers

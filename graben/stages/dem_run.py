@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from graben.schemas.faults import BadInput, Fault
+from graben.errors import BadInput, Fault
 from graben.schemas.files import refuse_existing
 from graben.schemas.scene import load_scene
 from graben.stages.record import Progress, silent

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.continuum.mapped import mapped_mesh
 from graben.mechanics.continuum.mesh2d import QuadMesh, orient
 from graben.mechanics.continuum.paved import paved_mesh
 from graben.mechanics.continuum.sizing import SizeField
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.scenes.fem import FemScene
 
 MOST_ELEMENTS = 400_000

@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from graben.errors import BadInput, Fault, NumericsFailed
 from graben.mechanics.continuum.body import Body, Material, State, make_body
 from graben.mechanics.continuum.march import March, StepOptions, march
 from graben.mechanics.continuum.mesh2d import QuadMesh
 from graben.mechanics.continuum.newton import NewtonOptions, Step
 from graben.mechanics.continuum.quads import body_force, edge_traction
 from graben.mechanics.continuum.stability import softest_stiffness
-from graben.mechanics.failure import NumericsFailed
 from graben.mechanics.materials.laws import LAWS
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import refuse_existing
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.fem import FemScene

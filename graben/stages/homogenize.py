@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.averaging.history import Average, average
 from graben.mechanics.averaging.rev import Circle, Polygon, Rev
 from graben.schemas.artifact import write_artifact
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import refuse_existing
 from graben.schemas.layouts.curves import LAYOUT
 from graben.schemas.vtk import VtuSeries

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import xarray
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.averaging.spheres import best_fit_gradient, love_weber
 from graben.schemas.artifact import read_artifact, write_artifact
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.layouts.curves import LAYOUT
 from graben.stages.record import Progress, Record
 

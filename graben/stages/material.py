@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.materials.law import Law
 from graben.mechanics.materials.laws import LAWS
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.scenes.material import MaterialTable, read_material
 
 

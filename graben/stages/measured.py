@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.search.curves import Curve
 from graben.schemas.artifact import read_artifact
-from graben.schemas.faults import BadInput, Fault
 
 _STRESS_UNITS = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "gpa": 1e9}
 _AXES = ("xx", "yy", "zz", "xy")

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from graben.mechanics.failure import NumericsFailed
-from graben.schemas.faults import BadInput, NotFinite
+from graben.errors import BadInput, NotFinite, NumericsFailed
 
 DONE, BAD_INPUT, NUMERICS, INTERRUPTED = 0, 2, 3, 130
 

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from graben.mechanics.failure import NumericsFailed
+from graben.errors import BadInput, Fault, NumericsFailed
 from graben.mechanics.particles.bed import HISTORY, Bed, BedFailed, BedRecipe, Snapshot, make_bed
 from graben.mechanics.particles.law import LinearLaw
 from graben.mechanics.particles.sampling import interval_over_areas, interval_over_beds
 from graben.schemas.artifact import write_artifact
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.layouts.particles import LAYOUT
 from graben.schemas.scenes.particles import ParticlesScene
 from graben.schemas.vtk import VtuSeries, write_vtu

@@ -5,8 +5,8 @@ from __future__ import annotations
 from importlib import import_module
 from pathlib import Path
 
+from graben.errors import BadInput, Fault
 from graben.schemas.artifact import read_artifact
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import refuse_existing, whole_file
 from graben.schemas.kinds import LAYOUTS
 

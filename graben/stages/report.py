@@ -9,8 +9,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from graben.errors import BadInput, Fault
 from graben.schemas.artifact import read_artifact
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import refuse_existing, whole_file
 from graben.schemas.kinds import LAYOUTS
 from graben.stages import picture

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.materials.laws import LAWS
 from graben.mechanics.search.curves import Curve, CurveFit, Weights
 from graben.mechanics.search.identifiability import identify
 from graben.mechanics.search.levenberg_marquardt import jacobian
 from graben.mechanics.search.multistart import Found, Plan, search
 from graben.mechanics.search.space import Box
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.rev_study import RevStudyScene
 from graben.stages.record import Progress

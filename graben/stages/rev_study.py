@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.averaging.history import average
 from graben.mechanics.averaging.measures import MEASURES, curve_measures
 from graben.mechanics.averaging.representative import (
@@ -20,7 +21,6 @@ from graben.mechanics.averaging.representative import (
 )
 from graben.mechanics.averaging.rev import Circle
 from graben.schemas.artifact import write_artifact
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import refuse_existing
 from graben.schemas.layouts.rev_study import LAYOUT
 from graben.schemas.scene import load_scene

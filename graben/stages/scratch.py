@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from graben.errors import BadInput, Fault, NumericsFailed
 from graben.mechanics.continuum.scratch import run as mechanics
 from graben.mechanics.continuum.scratch.mesh import HexMesh, specimen
-from graben.mechanics.failure import NumericsFailed
 from graben.mechanics.materials.law import Law
 from graben.mechanics.materials.laws import LAWS
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import refuse_existing
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.scratch import ScratchScene

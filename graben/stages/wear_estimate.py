@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from graben.errors import BadInput, Fault
 from graben.mechanics.wear.counts import contacts_per_area, doubts
 from graben.mechanics.wear.rate import GrooveTable, balanced_forces, carried_load, wear_rates
 from graben.schemas.artifact import read_artifact, write_artifact
-from graben.schemas.faults import BadInput, Fault
 from graben.schemas.files import refuse_existing
 from graben.schemas.layouts.wear import LAYOUT
 from graben.schemas.scene import load_scene

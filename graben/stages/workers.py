@@ -11,7 +11,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import TYPE_CHECKING, Any
 
-from graben.schemas.faults import BadInput, Fault
+from graben.errors import BadInput, Fault
 
 if TYPE_CHECKING:
     from distributed import Client

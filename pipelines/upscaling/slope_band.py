@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.mechanics.failure import NumericsFailed
+from graben.errors import NumericsFailed
 from graben.mechanics.materials.laws import LAWS
 from graben.schemas.artifact import read_artifact
 from graben.schemas.scenes.material import read_material, write_material

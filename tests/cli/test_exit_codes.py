@@ -7,8 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from graben.cli.options import Session, Tool, session_options, stage_options
-from graben.mechanics.failure import NumericsFailed
-from graben.schemas.faults import BadInput, Fault, NotFinite
+from graben.errors import BadInput, Fault, NotFinite, NumericsFailed
 
 
 def tool(body):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from graben.errors import BadInput, NotFinite
 from graben.schemas import kinds
 from graben.schemas.artifact import Layout, Variable, check_artifact, read_artifact, write_artifact
-from graben.schemas.faults import BadInput, NotFinite
 from graben.schemas.provenance import Record
 
 LAYOUT = Layout(

@@ -7,7 +7,7 @@ from typing import get_args
 import pytest
 from pydantic import BaseModel
 
-from graben.schemas.faults import BadInput
+from graben.errors import BadInput
 from graben.schemas.kinds import SCENES, scene_model
 from graben.schemas.scene import load_scene
 from graben.schemas.template import json_schema, template

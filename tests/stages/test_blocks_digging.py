@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from graben.errors import BadInput
 from graben.schemas.artifact import read_artifact
-from graben.schemas.faults import BadInput
 from graben.stages import dem_run, homogenize, picture
 from tests.stages.test_blocks_loading import stopped_and_straight
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray
 
+from graben.errors import BadInput
 from graben.schemas.artifact import check_artifact, read_artifact
-from graben.schemas.faults import BadInput
 from graben.stages import dem_run
 
 SQUARE = """

@@ -6,8 +6,8 @@ import meshio
 import numpy as np
 import pytest
 
+from graben.errors import BadInput
 from graben.schemas.artifact import read_artifact
-from graben.schemas.faults import BadInput
 from graben.schemas.polygon_file import read_polygons
 from graben.schemas.scenes.blocks import Joints
 from graben.stages import dem_run

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import xarray
 
-from graben.mechanics.failure import NumericsFailed
+from graben.errors import BadInput, NumericsFailed
 from graben.schemas.artifact import check_artifact, read_artifact
-from graben.schemas.faults import BadInput
 from graben.stages import dem_run, picture
 
 SLOPE = """

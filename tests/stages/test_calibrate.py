@@ -9,8 +9,8 @@ import xarray
 from click.testing import CliRunner
 
 from graben.cli.calibrate import main
+from graben.errors import BadInput
 from graben.schemas.check import check
-from graben.schemas.faults import BadInput
 from graben.stages import calibrate
 from graben.stages.material import pack_material
 

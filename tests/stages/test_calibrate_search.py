@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import xarray
 
+from graben.errors import BadInput
 from graben.schemas.check import check
-from graben.schemas.faults import BadInput
 from graben.stages import calibrate
 from tests.conftest import PIPELINES
 

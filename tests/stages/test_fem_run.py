@@ -9,8 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from graben.cli.fem_run import main
+from graben.errors import BadInput
 from graben.schemas.artifact import check_artifact, read_artifact
-from graben.schemas.faults import BadInput
 from graben.stages import fem_run
 
 # A block of 4 m x 3 m of cohesive rock (von Mises), pressed on its left half.

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from graben.errors import BadInput
 from graben.schemas.artifact import read_artifact, write_artifact
-from graben.schemas.faults import BadInput
 from graben.schemas.layouts.blocks import LAYOUT
 from graben.schemas.provenance import Record
 from graben.stages import homogenize, rev_study

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from graben.errors import BadInput
 from graben.schemas.artifact import read_artifact, write_artifact
-from graben.schemas.faults import BadInput
 from graben.schemas.layouts.particles import LAYOUT
 from graben.schemas.provenance import Record
 from graben.stages import homogenize, particles

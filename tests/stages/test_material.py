@@ -2,8 +2,8 @@
 
 import pytest
 
+from graben.errors import BadInput
 from graben.mechanics.materials.laws import LAWS
-from graben.schemas.faults import BadInput
 from graben.schemas.scenes.material import UNITS, MaterialTable, read_material, write_material
 from graben.stages.material import pack_material
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from graben.schemas.faults import BadInput
+from graben.errors import BadInput
 from graben.stages.measured import Reading, read_measured
 
 REFERENCE = Path(__file__).parents[2] / "pipelines/upscaling/reference/udec_voronoi_granite_fit.csv"

@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from graben.cli.dem_run import main
+from graben.errors import BadInput
 from graben.schemas.artifact import check_artifact, read_artifact
-from graben.schemas.faults import BadInput
 from graben.stages import dem_run
 
 SCENE = """

@@ -2,7 +2,7 @@
 
 import pytest
 
-from graben.schemas.faults import BadInput
+from graben.errors import BadInput
 from graben.stages import picture, report
 
 

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from graben.mechanics.failure import NumericsFailed
+from graben.errors import BadInput, NumericsFailed
 from graben.schemas.artifact import read_artifact
-from graben.schemas.faults import BadInput
 from graben.stages import picture, scratch
 
 SMALL = (

@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from graben.cli.wear_estimate import main
+from graben.errors import BadInput
 from graben.schemas.artifact import check_artifact, read_artifact, write_artifact
-from graben.schemas.faults import BadInput
 from graben.schemas.layouts.particles import LAYOUT as PARTICLES
 from graben.schemas.layouts.scratch import LAYOUT as SCRATCH
 from graben.schemas.provenance import Record

@@ -6,8 +6,7 @@ import time
 
 import pytest
 
-from graben.mechanics.failure import NumericsFailed
-from graben.schemas.faults import BadInput, Fault
+from graben.errors import BadInput, Fault, NumericsFailed
 from graben.stages.workers import compute
 
 TASKS = list(range(6))

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from graben.errors import NumericsFailed
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.courses import Course
 from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.blocks.pace import ForceCheck, Pace
-from graben.mechanics.failure import NumericsFailed
 
 # Rest comes soonest with more damping than a moving wall should feel.
 _CONSOLIDATION_DAMPING = 1.0

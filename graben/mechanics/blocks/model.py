@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from graben.errors import NumericsFailed
 from graben.mechanics.blocks import moving, search, watch, zones
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.bodies import Bodies, Skin, chamfered_skin
@@ -23,7 +24,6 @@ from graben.mechanics.blocks.rigid_blocks import (
     stiffest_motion,
 )
 from graben.mechanics.blocks.team import run_together, share_out
-from graben.mechanics.failure import NumericsFailed
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from graben.errors import NumericsFailed
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.bodies import Bodies
 from graben.mechanics.blocks.loads import Loads
 from graben.mechanics.blocks.model import BlockModel, Damping
-from graben.mechanics.failure import NumericsFailed
 
 # Rest comes soonest with more damping than a rising load should feel.
 _SETTLING_DAMPING = 1.0

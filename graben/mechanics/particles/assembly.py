@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from graben.mechanics.failure import NumericsFailed
+from graben.errors import NumericsFailed
 from graben.mechanics.particles import motion
 from graben.mechanics.particles.contacts import close_ledger
 from graben.mechanics.particles.law import LinearLaw, critical_step

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from graben.mechanics.failure import NumericsFailed
+from graben.errors import NumericsFailed
 from graben.mechanics.particles import motion
 from graben.mechanics.particles.assembly import Assembly, ContactForces, Survey
 from graben.mechanics.particles.insertion import insert

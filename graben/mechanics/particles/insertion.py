@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import NumericsFailed
 from graben.mechanics.compiled import kernel
-from graben.mechanics.failure import NumericsFailed
 from graben.mechanics.particles.neighbours import grid_shape
 
 

@@ -17,7 +17,7 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
-from graben.schemas.faults import BadInput, Fault
+from graben.errors import BadInput, Fault
 from graben.schemas.files import whole_file
 from graben.schemas.quantities import key, to_si
 from graben.schemas.scene import InputFile, Model

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from graben.errors import NumericsFailed
 from graben.mechanics.blocks import contact, joints, nodes, search, watch
 from graben.mechanics.blocks.bodies import build_bodies, chamfered_skin
 from graben.mechanics.blocks.joints import SLIP, Joint
 from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.blocks.tessellation import from_polygons, voronoi_blocks
-from graben.mechanics.failure import NumericsFailed
 
 from .reference import boxes_meet, pair_force, shared_interval
 

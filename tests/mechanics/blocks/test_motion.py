@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from graben.errors import NumericsFailed
 from graben.mechanics.blocks import parts
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.compression import compress, consolidate, rectangle_sides
@@ -10,7 +11,6 @@ from graben.mechanics.blocks.history import History, mean_stress
 from graben.mechanics.blocks.joints import Joint
 from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.blocks.tessellation import from_polygons, voronoi_blocks
-from graben.mechanics.failure import NumericsFailed
 
 
 def rectangle(x0, y0, x1, y1):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from graben.mechanics.failure import NumericsFailed
+from graben.errors import NumericsFailed
 from graben.mechanics.particles.bed import HISTORY, BedRecipe, make_bed, numbers
 from graben.mechanics.particles.law import LinearLaw
 from graben.mechanics.particles.sampling import interval_over_areas, interval_over_beds

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from graben.errors import NumericsFailed
 from graben.mechanics.compiled import kernel
 from graben.mechanics.continuum.scratch.contact import sphere_contact
 from graben.mechanics.continuum.scratch.eight_points import forces_eight_points
@@ -16,7 +17,6 @@ from graben.mechanics.continuum.scratch.motion import tip_position
 from graben.mechanics.continuum.scratch.one_point import EXTERNAL, KINETIC, LEDGER_SIZE, forces_one_point
 from graben.mechanics.continuum.scratch.stepping import kick_and_drift, kinetic_energy, refresh
 from graben.mechanics.continuum.scratch.surface import bared_supports, contact_stiffness, exposed_faces
-from graben.mechanics.failure import NumericsFailed
 
 if TYPE_CHECKING:
     from graben.mechanics.continuum.scratch.run import Damage, Numerics, Snapshot, Tip

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import NumericsFailed
 from graben.mechanics.continuum.scratch.body import Body, elastic_moduli
 from graben.mechanics.continuum.scratch.mesh import Floats, HexMesh, Ints
 from graben.mechanics.continuum.scratch.motion import Phase, phase_rows
@@ -24,7 +25,6 @@ from graben.mechanics.continuum.scratch.one_point import (
     TANGENTIAL,
     VISCOUS,
 )
-from graben.mechanics.failure import NumericsFailed
 
 ENERGIES = (
     "external", "internal", "kinetic", "friction", "contact", "hourglass", "viscous", "damping", "added_mass"

@@ -1,0 +1,71 @@
+"""The errors that graben raises on purpose; one family, so that a caller can tell them from faults of the program.
+
+``BadInput`` is exit code 2 on the command line, ``NumericsFailed`` and ``NotFinite`` are 3. Mechanics, which knows
+no file, raises ``Refused`` for input that it cannot take; the stage turns it into ``BadInput`` with the file and key.
+A plain ``ValueError`` is a fault of the program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class GrabenError(Exception):
+    """Root of the family."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault: the file, the key or variable in it, the value found, and what was expected."""
+
+    file: str
+    key: str
+    value: str
+    expected: str
+
+    def __str__(self) -> str:
+        place = f"{self.file}: {self.key}" if self.key else self.file
+        found = f" = {self.value}" if self.value else ""
+        return f"{place}{found}: expected {self.expected}"
+
+
+class BadInput(GrabenError, ValueError):
+    """Raised with every fault of the input at once; nothing has been written."""
+
+    def __init__(self, faults: Sequence[Fault] | Fault) -> None:
+        self.faults: list[Fault] = [faults] if isinstance(faults, Fault) else list(faults)
+        super().__init__("\n".join(str(f) for f in self.faults))
+
+    def __reduce__(self) -> tuple[type[BadInput], tuple[list[Fault]]]:
+        return BadInput, (self.faults,)  # as it is when it comes from a worker process
+
+
+class Refused(GrabenError, ValueError):
+    """Mechanics cannot take this input; says what was expected, without file or key."""
+
+
+class NotFinite(GrabenError, ArithmeticError):
+    """A result to be written holds nan or infinity where its layout allows none."""
+
+
+class NumericsFailed(GrabenError, RuntimeError):
+    """A computation cannot go on. Says what failed, where, at which step, and what to change.
+
+    Parameters
+    ----------
+    what : the quantity that failed and by how much, e.g. ``"energy error 4.1 % (limit 3 %)"``
+    where : the block, element or particle concerned, if known
+    step : the step at which it was noticed, if stepping
+    advice : what a user can change in the scene
+    """
+
+    def __init__(self, what: str, *, where: str = "", step: int | None = None, advice: str = "") -> None:
+        self.what, self.where, self.step, self.advice = what, where, step, advice
+        parts = [what]
+        if where:
+            parts.append(f"at {where}")
+        if step is not None:
+            parts.append(f"in step {step}")
+        text = " ".join(parts)
+        super().__init__(f"{text}; {advice}" if advice else text)
