@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import xarray
 
-from graben.errors import BadInput, Fault
+from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.averaging.history import Contacts, History
 from graben.mechanics.averaging.outline import domain_outline
 from graben.mechanics.averaging.rev import Circle, Rev
@@ -99,7 +99,7 @@ def read_run(path: Path) -> Run:
     )
     try:
         _ = history.network
-    except ValueError as error:
+    except Refused as error:
         raise BadInput(Fault(str(path), "zone_vertex", "", f"blocks with closed outlines ({error})")) from error
     removed = np.asarray(
         data["block_removed"].values > 0 if "block_removed" in data else np.zeros((0, 0), dtype=bool)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault, NumericsFailed
+from graben.errors import BadInput, Fault, NumericsFailed, Refused
 from graben.mechanics.blocks import snapshot
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.history import History
@@ -68,7 +68,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
             model = _model(scene, tessellation, programme.end / steps, gravity)
             _put_stress_in(scene, model)
             test = Rising(scene, model, steps)
-    except ValueError as error:
+    except Refused as error:
         raise BadInput(Fault(str(scene.source.path), "", "", f"a scene that can be run ({error})")) from error
     progress(0.0, f"{tessellation.size} blocks come to rest")
     if parts is None:

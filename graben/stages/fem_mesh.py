@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from graben.errors import BadInput, Fault
+from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.continuum.mapped import mapped_mesh
 from graben.mechanics.continuum.mesh2d import QuadMesh, orient
 from graben.mechanics.continuum.paved import paved_mesh
@@ -45,7 +45,7 @@ def mesh_of(scene: FemScene) -> QuadMesh:
         if mesh.method == "paved":
             return paved_mesh(shape, size)
         return mapped_mesh(shape, np.array(mesh.patches, dtype=np.int64), size)
-    except ValueError as error:
+    except Refused as error:
         raise BadInput(Fault(file, key, "", f"a domain that can be meshed ({error})")) from None
 
 
@@ -71,5 +71,5 @@ def read_quads(path: Path) -> QuadMesh:
         raise BadInput(Fault(str(path), "points", "z varies", "a plane mesh in x and y"))
     try:
         return orient(points, np.concatenate(blocks))
-    except ValueError as error:
+    except Refused as error:
         raise BadInput(Fault(str(path), "cells", "", f"convex quads ({error})")) from None

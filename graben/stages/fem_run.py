@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault, NumericsFailed
+from graben.errors import BadInput, Fault, NumericsFailed, Refused
 from graben.mechanics.continuum.body import Body, Material, State, make_body
 from graben.mechanics.continuum.march import March, StepOptions, march
 from graben.mechanics.continuum.mesh2d import QuadMesh
@@ -156,7 +156,7 @@ def _problem(scene: FemScene, mesh: QuadMesh, law: Material) -> Problem:
     for k, load in enumerate(scene.loads):
         try:
             force, covered = edge_traction(mesh, np.array(load.start), np.array(load.end))
-        except ValueError as error:
+        except Refused as error:
             faults.append(Fault(file, f"loads.{k}", load.name, f"a segment of the outline ({error})"))
             continue
         steady += load.pressure * force

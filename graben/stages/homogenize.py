@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault
+from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.averaging.history import Average, average
 from graben.mechanics.averaging.rev import Circle, Polygon, Rev
 from graben.schemas.artifact import write_artifact
@@ -190,7 +190,7 @@ def _jobs(
             revs: list[Rev] = [Circle((centre[0], centre[1]) if centre else source.middle, r) for r in radii]
             if polygon:
                 revs.append(Polygon(tuple(polygon)))
-        except ValueError as error:
+        except Refused as error:
             return [], [Fault("homogenize", "--radius" if radii else "--polygon", "", str(error))]
         for rev in revs:
             faults += source.refuse_outside(rev, "--radius" if radii else "--polygon", chosen_at)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault, NumericsFailed
+from graben.errors import BadInput, Fault, NumericsFailed, Refused
 from graben.mechanics.particles.bed import HISTORY, Bed, BedFailed, BedRecipe, Snapshot, make_bed
 from graben.mechanics.particles.law import LinearLaw
 from graben.mechanics.particles.sampling import interval_over_areas, interval_over_beds
@@ -38,7 +38,7 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
     try:
         law, recipe = _law(scene), _recipe(scene)
         beds = [make_bed(law, recipe, scene.seed + b, _part(progress, b, scene.beds)) for b in range(scene.beds)]
-    except ValueError as error:
+    except Refused as error:
         raise BadInput(Fault(str(scene.source.path), "", "", f"a scene that can be run ({error})")) from error
     except BedFailed as failure:
         kept = _write_last_good(output, failure.last_good)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault
+from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.materials.laws import LAWS
 from graben.mechanics.search.curves import Curve, CurveFit, Weights
 from graben.mechanics.search.identifiability import identify
@@ -131,7 +131,7 @@ def fit_samples(
     first = task(radii - 1, middle, groups[0], _FIRST[scene.fidelity], None)
     try:
         fit, found = first.solve()
-    except ValueError as error:
+    except Refused as error:
         raise BadInput(Fault(str(law.source.path), "", "", f"a law that can be fitted ({error})")) from error
     best = found.best
     known = identify(

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault
+from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.wear.counts import contacts_per_area, doubts
 from graben.mechanics.wear.rate import GrooveTable, balanced_forces, carried_load, wear_rates
 from graben.schemas.artifact import read_artifact, write_artifact
@@ -264,7 +264,7 @@ def _rate(
                     f"{mixture.name}, {scene.grains[i].name}: {d}"
                     for d in table.doubts(float(force[i]), 0.5 * diameter[i])
                 ]
-    except ValueError as error:
+    except Refused as error:
         raise BadInput(
             Fault(file, f"mixtures {mixture.name!r}", "", f"a mixture that can be rated ({error})")
         ) from error

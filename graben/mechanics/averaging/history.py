@@ -177,7 +177,7 @@ def average(history: History, rev: Rev, deformed: bool = False, chosen_at: int =
 
     Raises
     ------
-    ValueError : no block meets the region
+    Refused : no block meets the region
     """
     network, count = history.network, history.time.size
     outline = find_outline(network, rev, history.current[chosen_at] if chosen_at else None)

@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from graben.errors import Refused
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -115,7 +117,7 @@ def build_network(
 
     Raises
     ------
-    ValueError : an outline that is not one closed curve
+    Refused : an outline that is not one closed curve
     """
     edge, edge_block = _block_edges(position, block_count, zone_vertex, zone_block, corner_count, corner)
     following = _next_edges(edge, edge_block, position.shape[0])
@@ -183,7 +185,7 @@ def _next_edges(edge: Ints, edge_block: Ints, vertex_count: int) -> Ints:
     wrong |= np.bincount(edge[:, 0], minlength=vertex_count)[edge[:, 0]] != 1
     if wrong.any():
         blocks = np.unique(edge_block[wrong])
-        raise ValueError(f"the outline of block {int(blocks[0])} is not one closed curve ({blocks.size} such blocks)")
+        raise Refused(f"the outline of block {int(blocks[0])} is not one closed curve ({blocks.size} such blocks)")
     return following
 
 

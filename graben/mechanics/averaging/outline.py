@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from graben.errors import Refused
 from graben.mechanics.averaging.network import Network
 from graben.mechanics.averaging.rev import Rev, in_polygon
 
@@ -83,7 +84,7 @@ def find_outline(network: Network, rev: Rev, position: Floats | None = None) -> 
 
     Raises
     ------
-    ValueError : no block meets the REV
+    Refused : no block meets the REV
     """
     place = network.position if position is None else position
     crossed = rev.crossed(network, place)
@@ -91,7 +92,7 @@ def find_outline(network: Network, rev: Rev, position: Floats | None = None) -> 
     inside = ~crossed & rev.contains(points)
     chosen = crossed | inside
     if not chosen.any():
-        raise ValueError(f"no block meets the REV of radius {rev.radius:g} m at {rev.centre}")
+        raise Refused(f"no block meets the REV of radius {rev.radius:g} m at {rev.centre}")
     blocks, loop = _enclose(network, chosen)
     vertex, weight = _nodes(network, loop)
     steps = _steps(network, crossed, inside, np.where(weight < 0.5, vertex[:, 0], vertex[:, 1]))

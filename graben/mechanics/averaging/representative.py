@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from graben.errors import Refused
+
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -73,14 +75,14 @@ def convergence(values: Floats, criteria: Criteria, seed: int, independent: Floa
 
     Raises
     ------
-    ValueError : a radius without any value
+    Refused : a radius without any value
     """
     radii = values.shape[0]
     flat = values.reshape(radii, -1)
     known = np.isfinite(flat)
     count = known.sum(axis=1)
     if (count == 0).any():
-        raise ValueError(f"no sample has a value at radius number {int(np.argmin(count)) + 1}")
+        raise Refused(f"no sample has a value at radius number {int(np.argmin(count)) + 1}")
     mean = np.array([flat[k, known[k]].mean() for k in range(radii)])
     if values.shape[2] >= 3:
         deviation = np.array([_deviation_over_runs(values[k]) for k in range(radii)])

@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
 from graben.mechanics.averaging.network import Network
 
 Floats = NDArray[np.float64]
@@ -45,9 +46,7 @@ class Circle:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.radius) and self.radius > 0.0 and np.isfinite(self.centre).all()):
-            raise ValueError(
-                f"a circle needs a finite centre and a positive radius, found {self.centre}, {self.radius}"
-            )
+            raise Refused(f"a circle needs a finite centre and a positive radius, found {self.centre}, {self.radius}")
 
     def crossed(self, network: Network, position: Floats) -> Flags:
         centre = np.asarray(self.centre)
@@ -78,9 +77,9 @@ class Polygon:
     def __post_init__(self) -> None:
         points = self.points
         if points.ndim != 2 or points.shape[0] < 3 or points.shape[1] != 2 or not np.isfinite(points).all():
-            raise ValueError("a polygon needs at least three corners, each with two finite coordinates")
+            raise Refused("a polygon needs at least three corners, each with two finite coordinates")
         if abs(polygon_area(points)) <= 0.0 or _crosses_itself(points):
-            raise ValueError("a polygon must enclose an area and not cross itself")
+            raise Refused("a polygon must enclose an area and not cross itself")
 
     @property
     def points(self) -> Floats:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -30,7 +32,7 @@ def love_weber(inside: Flags, centre: Floats, pair: Ints, force: Floats, point: 
     (3, 3) Pa, tension positive, not symmetrized (spheres that carry moments have an antisymmetric part)
     """
     if volume <= 0.0:
-        raise ValueError(f"the volume must be positive, found {volume}")
+        raise Refused(f"the volume must be positive, found {volume}")
     total = np.zeros((3, 3))
     for side, sign in ((0, 1.0), (1, -1.0)):
         who = pair[:, side]
@@ -54,12 +56,12 @@ def best_fit_gradient(position: Floats, displacement: Floats) -> Floats:
 
     Raises
     ------
-    ValueError : fewer spheres than needed, or all in one plane
+    Refused : fewer spheres than needed, or all in one plane
     """
     x = position - position.mean(axis=0)
     u = displacement - displacement.mean(axis=-2, keepdims=True)
     spread = x.T @ x
     if position.shape[0] <= position.shape[1] or np.linalg.cond(spread) > 1e12:
-        raise ValueError(f"{position.shape[0]} spheres do not span the space: no strain can be fitted")
+        raise Refused(f"{position.shape[0]} spheres do not span the space: no strain can be fitted")
     drive = np.einsum("...ni,nj->...ij", u, x)
     return np.linalg.solve(spread, np.swapaxes(drive, -1, -2)).swapaxes(-1, -2)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from graben.errors import Refused
 from graben.mechanics.blocks.polygons import distance_to_sides
 from graben.mechanics.blocks.tessellation import Tessellation
 
@@ -142,7 +143,7 @@ def ear_clip(ring: np.ndarray) -> np.ndarray:
             if shape > best_shape:
                 best, best_shape = k, shape
         if best < 0:
-            raise ValueError("block outline is not a simple counter-clockwise polygon")
+            raise Refused("block outline is not a simple counter-clockwise polygon")
         triangles.append((left[best - 1], left[best], left[(best + 1) % len(left)]))
         del left[best]
     triangles.append(tuple(left))

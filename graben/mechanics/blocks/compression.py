@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from graben.errors import NumericsFailed
+from graben.errors import NumericsFailed, Refused
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.courses import Course
 from graben.mechanics.blocks.model import BlockModel, Damping
@@ -34,7 +34,7 @@ def rectangle_sides(outline: np.ndarray) -> Sides:
     """Sides of an upright rectangle (4, 2), counter-clockwise; ValueError for anything else."""
     d = np.roll(outline, -1, axis=0) - outline
     if len(outline) != 4 or np.any(np.abs(d[:, 0] * d[:, 1]) > 1e-9 * np.abs(d).max() ** 2):
-        raise ValueError("biaxial compression needs an upright rectangle as domain")
+        raise Refused("biaxial compression needs an upright rectangle as domain")
     return Sides(int(np.argmax(d[:, 0])), int(np.argmax(d[:, 1])), int(np.argmin(d[:, 0])), int(np.argmin(d[:, 1])))
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from graben.errors import Refused
 from graben.mechanics.blocks.joints import _BEND, STICK, STIFFENING
 from graben.mechanics.blocks.model import BlockModel
 from graben.mechanics.blocks.nodes import LENGTH, TX, TY, X, Y
@@ -35,7 +36,7 @@ class InSitu:
 def put_in(model: BlockModel, field: InSitu) -> None:
     """Put a stress into zones and joints of a model that has not moved yet.
 
-    Raises ValueError where the rock is too soft for it.
+    Raises Refused where the rock is too soft for it.
     """
     _stress_zones(model, field)
     _stress_joints(model, field)
@@ -56,7 +57,7 @@ def _stress_zones(model: BlockModel, field: InSitu) -> None:
         trace = np.trace(s, axis1=1, axis2=2)[:, None, None]
         strain = (s - 0.5 * lam / (lam + mu) * trace * one) / (2.0 * mu)
         if not np.abs(strain).max() < 0.05:
-            raise ValueError(f"in-situ stress {np.abs(sigma).max():.3g} Pa strains the rock by more than 5 %")
+            raise Refused(f"in-situ stress {np.abs(sigma).max():.3g} Pa strains the rock by more than 5 %")
         c = one + 2.0 * strain
         root = np.sqrt(np.linalg.det(c))[:, None, None]
         u = (c + root * one) / np.sqrt(np.trace(c, axis1=1, axis2=2)[:, None, None] + 2.0 * root)

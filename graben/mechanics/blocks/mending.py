@@ -16,6 +16,7 @@ from collections import defaultdict
 import numpy as np
 from scipy.spatial import cKDTree
 
+from graben.errors import Refused
 from graben.mechanics.blocks import polygons
 from graben.mechanics.blocks.tessellation import (
     Marks,
@@ -47,7 +48,7 @@ def mend(
     shapes = [s if polygons.signed_area(s) > 0.0 else s[::-1] for s in given]
     for k, shape in enumerate(shapes):
         if len(shape) < 3 or not polygons.is_simple(shape):
-            raise ValueError(f"polygon {k} is no simple polygon")
+            raise Refused(f"polygon {k} is no simple polygon")
     points, rings = shared_points(shapes)
     marks = None if edge_sets is None else _marks(points, given, edge_sets)
     rings = _with_hanging_points(points, rings, marks)
@@ -115,7 +116,7 @@ def outer_boundary(points: np.ndarray, rings: list[list[int]]) -> np.ndarray:
         if area > largest:
             best, largest = xy, area
     if best is None:
-        raise ValueError("the polygons have no outer boundary")
+        raise Refused("the polygons have no outer boundary")
     return best
 
 
@@ -162,12 +163,12 @@ def _refuse_overlaps(points: np.ndarray, rings: list[list[int]]) -> None:
     for k, ring in enumerate(rings):
         for edge in edges_of(ring):
             if edge in seen:
-                raise ValueError(f"polygons {seen[edge]} and {k} overlap")
+                raise Refused(f"polygons {seen[edge]} and {k} overlap")
             seen[edge] = k
     total = sum(polygons.signed_area(points[ring]) for ring in rings)
     hull = float(np.prod(np.ptp(points, axis=0)))
     if total > hull * (1.0 + 1e-6):
-        raise ValueError("polygons overlap: their areas add up to more than the box around them")
+        raise Refused("polygons overlap: their areas add up to more than the box around them")
 
 
 def _merge_slivers(points, rings, thinnest: float, smallest: float) -> list[list[int]]:

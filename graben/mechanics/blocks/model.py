@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from graben.errors import NumericsFailed
+from graben.errors import NumericsFailed, Refused
 from graben.mechanics.blocks import moving, search, watch, zones
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.bodies import Bodies, Skin, chamfered_skin
@@ -80,9 +80,9 @@ class BlockModel:
         kn = min(j.normal_stiffness for j in (joint, *more_joints))
         for name, value in (("young", young), ("density", density), ("kn", kn)):
             if not value > 0.0:
-                raise ValueError(f"{name} must be positive, found {value}")
+                raise Refused(f"{name} must be positive, found {value}")
         if not -1.0 < poisson < 0.5:
-            raise ValueError(f"poisson must lie between -1 and 0.5, found {poisson}")
+            raise Refused(f"poisson must lie between -1 and 0.5, found {poisson}")
         self.bodies = bodies
         self.joint = joint
         self.joints: tuple[Joint, ...] = (joint, *more_joints)
@@ -120,7 +120,7 @@ class BlockModel:
         given = np.zeros(len(bodies.edge_from)) if edge_set is None else np.asarray(edge_set)
         between = np.minimum.outer(sets, sets) if set_between is None else np.asarray(set_between)
         if given.shape != bodies.edge_from.shape or not np.isin(given, sets).all():
-            raise ValueError(f"edge_set: expected {len(bodies.edge_from)} numbers of joint sets (0 to {sets[-1]})")
+            raise Refused(f"edge_set: expected {len(bodies.edge_from)} numbers of joint sets (0 to {sets[-1]})")
         if between.shape != (len(sets),) * 2 or not np.isin(between, sets).all() or np.any(between != between.T):
             raise ValueError(f"set_between: expected a symmetric table {len(sets)} x {len(sets)} of joint sets")
         self._edge_material = given.astype(np.int64)[self.skin.edge]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from graben.errors import NumericsFailed
+from graben.errors import NumericsFailed, Refused
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.bodies import Bodies
 from graben.mechanics.blocks.loads import Loads
@@ -52,7 +52,7 @@ def pressure_forces(bodies: Bodies, start: np.ndarray, end: np.ndarray) -> np.nd
     beside = (off < 1e-6 * size) & (np.minimum(sp, sq) < length) & (np.maximum(sp, sq) > 0.0)
     a, b, sp, sq = a[beside], b[beside], sp[beside], sq[beside]
     if len(a) == 0:
-        raise ValueError(f"no part of the outline lies on the segment from {tuple(start)} to {tuple(end)}")
+        raise Refused(f"no part of the outline lies on the segment from {tuple(start)} to {tuple(end)}")
     # Covered part of each edge, as fractions of it from its first vertex.
     f0, f1 = np.clip((0.0 - sp) / (sq - sp), 0.0, 1.0), np.clip((length - sp) / (sq - sp), 0.0, 1.0)
     f0, f1 = np.minimum(f0, f1), np.maximum(f0, f1)

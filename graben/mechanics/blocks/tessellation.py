@@ -17,6 +17,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Voronoi, cKDTree
 
+from graben.errors import Refused
 from graben.mechanics.blocks import polygons
 
 # Mean block area over the square of the nominal edge: UDEC's generator made 419 blocks on 100 m2 for 0.5 m.
@@ -108,19 +109,19 @@ def voronoi_blocks(
 
     outline : (m, 2) simple polygon [m], any direction; edge : nominal edge [m]; shortest_edge : edges below are
     collapsed [m], by default 0.48 edge; count : number of seeds, by default from `edge` as UDEC's generator.
-    Raises ValueError on an outline that is not simple or is too thin for the block size.
+    Raises Refused on an outline that is not simple or is too thin for the block size.
     """
     outline = np.asarray(outline, dtype=float)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
         raise ValueError(f"outline: expected (m, 2) with m >= 3, found shape {outline.shape}")
     if not polygons.is_simple(outline):
-        raise ValueError("outline: two of its sides cross or touch")
+        raise Refused("outline: two of its sides cross or touch")
     area = polygons.signed_area(outline)
     if area < 0.0:
         outline, area = outline[::-1].copy(), -area
     n = count if count is not None else round(area / (AREA_PER_EDGE_SQUARED * edge**2))
     if n < 1:
-        raise ValueError(f"outline of {area:.3g} m2 is too small for blocks of edge {edge:.3g} m")
+        raise Refused(f"outline of {area:.3g} m2 is too small for blocks of edge {edge:.3g} m")
     limit = 0.48 * edge if shortest_edge is None else shortest_edge
     seeds = _random_points(outline, n, np.random.Generator(np.random.PCG64(seed)))
     for _ in range(lloyd_passes):
@@ -146,7 +147,7 @@ def without(tessellation: Tessellation, holes: list[np.ndarray]) -> Tessellation
     if not gone.any():
         return tessellation
     if gone.all():
-        raise ValueError("holes: no block is left")
+        raise Refused("holes: no block is left")
     rings = [ring for ring, out in zip(tessellation.rings, gone) if not out]
     return from_rings(points, rings, tessellation.outline, tessellation.marks)
 
@@ -184,7 +185,7 @@ def _cells(seeds: np.ndarray, outline: np.ndarray):
     area, _ = polygons.areas_and_centroids(points, start, np.arange(start[-1]))
     total = polygons.signed_area(outline)
     if abs(area.sum() - total) > 1e-6 * total or area.min() <= 0.0:
-        raise ValueError("outline: a part is thinner than a block, so a cell falls apart; use a smaller edge")
+        raise Refused("outline: a part is thinner than a block, so a cell falls apart; use a smaller edge")
     return points, start, np.arange(start[-1])
 
 
@@ -193,7 +194,7 @@ def _conforming(points, start, corner, outline, check: bool = True) -> Tessellat
     number, first = _equal_points(points, 1e-7 * float(np.ptp(outline, axis=0).max()))
     rings = [_without_repeats(number[corner[a:b]].tolist()) for a, b in itertools.pairwise(start)]
     if check and min(len(r) for r in rings) < 3:
-        raise ValueError("tessellation: a block has fewer than three corners")
+        raise Refused("tessellation: a block has fewer than three corners")
     return from_rings(points[first], rings, outline)
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from graben.errors import Refused
 from graben.mechanics.blocks.memory import ask_for
 from graben.mechanics.compiled import kernel
 
@@ -32,7 +33,7 @@ def shape_gradients(position: np.ndarray, triangles: np.ndarray):
         (p[:, 1, 0] - p[:, 0, 0]) * (p[:, 2, 1] - p[:, 0, 1]) - (p[:, 1, 1] - p[:, 0, 1]) * (p[:, 2, 0] - p[:, 0, 0])
     )
     if np.any(area <= 0.0):
-        raise ValueError(f"zone {int(np.argmin(area))} is turned over or has no area")
+        raise Refused(f"zone {int(np.argmin(area))} is turned over or has no area")
     gradient = np.stack([-edge[..., 1], edge[..., 0]], axis=-1) / (2.0 * area)[:, None, None]
     return np.ascontiguousarray(gradient), area
 

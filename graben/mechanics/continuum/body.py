@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from graben.errors import Refused
 from graben.mechanics.continuum.assembly import assemble
 from graben.mechanics.continuum.mesh2d import QuadMesh
 from graben.mechanics.continuum.pattern import Block, Pattern, block_of, pattern_of
@@ -153,7 +154,7 @@ def make_body(
     pattern = pattern_of(elements.dofs, size)
     fixed_dofs, free_dofs = np.flatnonzero(fixed), np.flatnonzero(~fixed)
     if not len(free_dofs):
-        raise ValueError("every degree of freedom is prescribed")
+        raise Refused("every degree of freedom is prescribed")
     return Body(
         mesh=mesh,
         elements=elements,

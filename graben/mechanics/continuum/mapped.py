@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from graben.errors import Refused
 from graben.mechanics.continuum.mesh2d import QuadMesh, check_mesh
 from graben.mechanics.continuum.sizing import SizeField, distance_to_segment
 
@@ -25,7 +26,7 @@ def mapped_mesh(corners: np.ndarray, patches: np.ndarray, size: SizeField) -> Qu
 
     Raises
     ------
-    ValueError : a patch is not convex, or a corner lies inside the side of another patch
+    Refused : a patch is not convex, or a corner lies inside the side of another patch
     """
     corners = np.ascontiguousarray(corners, dtype=np.float64)
     patches = np.ascontiguousarray(patches, dtype=np.int64)
@@ -34,13 +35,13 @@ def mapped_mesh(corners: np.ndarray, patches: np.ndarray, size: SizeField) -> Qu
     if patches.ndim != 2 or patches.shape[1] != 4:
         raise ValueError(f"patches must have shape (p, 4), found {patches.shape}")
     if patches.size == 0 or patches.min() < 0 or patches.max() >= len(corners):
-        raise ValueError(f"patches must name corners 0 to {len(corners) - 1}")
+        raise Refused(f"patches must name corners 0 to {len(corners) - 1}")
     coarse = QuadMesh(corners, patches)
     turned = (coarse.areas() < 0)[:, None]
     patches = np.where(turned, patches[:, ::-1], patches)
     for number, quality in enumerate(QuadMesh(corners, patches).corner_quality()):
         if quality < 0.05:
-            raise ValueError(f"patch {number} is not a convex quadrilateral (corner sine {quality:.3g})")
+            raise Refused(f"patch {number} is not a convex quadrilateral (corner sine {quality:.3g})")
     _refuse_hanging_corners(corners, patches)
 
     sides, side_of = _sides(patches)
@@ -139,7 +140,7 @@ def _refuse_hanging_corners(corners: np.ndarray, patches: np.ndarray) -> None:
         others = used[(used != a) & (used != b)]
         close = distance_to_segment(corners[others], corners[a], corners[b]) < 1e-9 * reach
         if np.any(close):
-            raise ValueError(
+            raise Refused(
                 f"corner {others[close][0]} lies on the side from corner {a} to corner {b}: "
                 "patches must meet along whole sides"
             )

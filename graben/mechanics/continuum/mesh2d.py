@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from graben.errors import Refused
 from graben.mechanics.continuum.sizing import distance_to_segment
 
 
@@ -24,13 +25,13 @@ class QuadMesh:
 
     def __post_init__(self) -> None:
         if self.points.ndim != 2 or self.points.shape[1] != 2:
-            raise ValueError(f"points must have shape (n, 2), found {self.points.shape}")
+            raise Refused(f"points must have shape (n, 2), found {self.points.shape}")
         if self.quads.ndim != 2 or self.quads.shape[1] != 4 or len(self.quads) == 0:
-            raise ValueError(f"quads must have shape (e, 4) with e > 0, found {self.quads.shape}")
+            raise Refused(f"quads must have shape (e, 4) with e > 0, found {self.quads.shape}")
         if not np.all(np.isfinite(self.points)):
-            raise ValueError("points must be finite")
+            raise Refused("points must be finite")
         if self.quads.min() < 0 or self.quads.max() >= len(self.points):
-            raise ValueError(f"quads name node {self.quads.max()} of {len(self.points)}")
+            raise Refused(f"quads name node {self.quads.max()} of {len(self.points)}")
 
     def areas(self) -> np.ndarray:
         """Area of each quadrilateral (e,), m2; negative where the corners run clockwise."""
@@ -52,7 +53,7 @@ class QuadMesh:
         edges = np.stack([self.quads, np.roll(self.quads, -1, axis=1)], axis=2).reshape(-1, 2)
         _, first, count = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
         if np.any(count > 2):
-            raise ValueError("an edge belongs to more than two elements")
+            raise Refused("an edge belongs to more than two elements")
         return edges[np.sort(first[count == 1])]
 
     def diameter(self) -> float:
@@ -73,13 +74,13 @@ def check_mesh(mesh: QuadMesh) -> None:
     bad = np.flatnonzero(quality <= 1e-3)
     if len(bad):
         where = mesh.points[mesh.quads[bad[0]]].mean(axis=0)
-        raise ValueError(
+        raise Refused(
             f"{len(bad)} of {len(quality)} elements are not convex (first: element {bad[0]} near "
             f"({where[0]:.4g}, {where[1]:.4g}) m, smallest corner sine {quality[bad[0]]:.2g})"
         )
     unused = np.setdiff1d(np.arange(len(mesh.points)), mesh.quads)
     if len(unused):
-        raise ValueError(f"{len(unused)} nodes belong to no element (first: node {unused[0]})")
+        raise Refused(f"{len(unused)} nodes belong to no element (first: node {unused[0]})")
 
 
 def orient(points: np.ndarray, quads: np.ndarray) -> QuadMesh:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import Delaunay
 
+from graben.errors import Refused
 from graben.mechanics.continuum.mesh2d import QuadMesh, check_mesh
 from graben.mechanics.continuum.sizing import SizeField, distance_to_segment
 
@@ -27,17 +28,17 @@ def paved_mesh(outline: np.ndarray, size: SizeField) -> QuadMesh:
 
     Raises
     ------
-    ValueError : the outline crosses itself, or the mesh could not follow it
+    Refused : the outline crosses itself, or the mesh could not follow it
     """
     outline = np.ascontiguousarray(outline, dtype=np.float64)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
-        raise ValueError(f"outline must have shape (c, 2) with c >= 3, found {outline.shape}")
+        raise Refused(f"outline must have shape (c, 2) with c >= 3, found {outline.shape}")
     x, y = outline.T
     area = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
     if area < 0:
         outline, area = outline[::-1], -area
     if _crosses_itself(outline) or not area > 0:
-        raise ValueError("the outline crosses or touches itself")
+        raise Refused("the outline crosses or touches itself")
     # A triangle of edge 2 h gives quads whose mean edge is close to h.
     coarse = SizeField(2 * size.size, size.segments, 2 * np.asarray(size.near_size), 2 * np.asarray(size.growth))
     border = _border(outline, coarse)
@@ -49,7 +50,7 @@ def paved_mesh(outline: np.ndarray, size: SizeField) -> QuadMesh:
     mesh = _three_quads_each(points, triangles)
     check_mesh(mesh)
     if abs(mesh.areas().sum() - area) > 1e-9 * area:
-        raise ValueError("the mesh does not fill the outline; try a smaller size near its narrow parts")
+        raise Refused("the mesh does not fill the outline; try a smaller size near its narrow parts")
     return mesh
 
 
@@ -151,7 +152,7 @@ def _check_border(triangles: np.ndarray, count: int) -> None:
     keys = set(map(tuple, have.tolist()))
     missing = [tuple(e) for e in border.tolist() if tuple(e) not in keys]
     if missing:
-        raise ValueError(f"{len(missing)} pieces of the outline are missing from the mesh; try a smaller size")
+        raise Refused(f"{len(missing)} pieces of the outline are missing from the mesh; try a smaller size")
 
 
 def _three_quads_each(points: np.ndarray, triangles: np.ndarray) -> QuadMesh:

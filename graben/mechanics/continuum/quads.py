@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from graben.errors import Refused
 from graben.mechanics.continuum.mesh2d import QuadMesh
 
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -51,7 +52,7 @@ def quad_elements(mesh: QuadMesh, mean_dilatation: bool = True) -> QuadElements:
     determinant = np.linalg.det(jacobian)
     if np.any(determinant <= 0):
         bad = int(np.argmin(determinant.min(axis=1)))
-        raise ValueError(f"element {bad} is turned over or not convex")
+        raise Refused(f"element {bad} is turned over or not convex")
     gradient = np.einsum("egij,gaj->egai", np.linalg.inv(jacobian), local)
     matrix = np.zeros((len(corners), 4, 3, 8))
     matrix[:, :, 0, 0::2] = gradient[..., 0]
@@ -106,12 +107,12 @@ def edge_traction(
 
     Raises
     ------
-    ValueError : the outline covers less than the whole segment
+    Refused : the outline covers less than the whole segment
     """
     start, end = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     span = float(np.hypot(*(end - start)))
     if not span > 0:
-        raise ValueError("a loaded segment needs two different ends")
+        raise Refused("a loaded segment needs two different ends")
     direction = (end - start) / span
     edges = mesh.boundary_edges()
     a, b = mesh.points[edges[:, 0]] - start, mesh.points[edges[:, 1]] - start
@@ -125,7 +126,7 @@ def edge_traction(
     loaded = np.flatnonzero((offset(a) < tolerance) & (offset(b) < tolerance) & (high - low > tolerance))
     covered = float((high - low)[loaded].sum())
     if abs(covered - span) > 1e-6 * span + 2 * tolerance:
-        raise ValueError(
+        raise Refused(
             f"the outline covers {covered:.6g} m of the {span:.6g} m between "
             f"({start[0]:g}, {start[1]:g}) and ({end[0]:g}, {end[1]:g})"
         )

@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
+
 OK = 0
 NOT_CONVERGED = 1  # the return mapping found no root
 NOT_FINITE = 2  # nan or inf came in, or a tensor too large to square
@@ -143,7 +145,7 @@ class Law:
         """Named values in SI -> par (k,). ValueError that lists every fault."""
         faults = self.faults(values)
         if faults:
-            raise ValueError(f"{self.name}: " + "; ".join(f"{name}: expected {text}" for name, text in faults))
+            raise Refused(f"{self.name}: " + "; ".join(f"{name}: expected {text}" for name, text in faults))
         values = self.spelled_out(values)
         numbers: list[float] = []
         tables: list[float] = []

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from graben.errors import NumericsFailed
+from graben.errors import NumericsFailed, Refused
 from graben.mechanics.particles import motion
 from graben.mechanics.particles.contacts import close_ledger
 from graben.mechanics.particles.law import LinearLaw, critical_step
@@ -95,7 +95,7 @@ class Assembly:
         self._skin = float(skin) * float(law.radius.min())
         reach = 2.0 * float(self.radius.max()) + 0.4 * float(law.radius.min())
         if self.periodic and self.width.min() < 3.0 * reach:
-            raise ValueError(
+            raise Refused(
                 f"width: a periodic box needs at least {3.0 * reach:.6g} m (three of its largest grains), "
                 f"found {self.width.min():.6g} m"
             )

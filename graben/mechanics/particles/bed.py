@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from graben.errors import NumericsFailed
+from graben.errors import NumericsFailed, Refused
 from graben.mechanics.particles import motion
 from graben.mechanics.particles.assembly import Assembly, ContactForces, Survey
 from graben.mechanics.particles.insertion import insert
@@ -96,14 +96,14 @@ class Bed:
 
 
 def numbers(law: LinearLaw, recipe: BedRecipe) -> Ints:
-    """Particles of each class (c,) for the nominal depth. Raises ValueError for an empty bed."""
+    """Particles of each class (c,) for the nominal depth. Raises Refused for an empty bed."""
     share = np.asarray(recipe.share, dtype=np.float64)
     if share.shape != law.radius.shape or np.any(share < 0.0) or abs(share.sum() - 1.0) > 1e-6:
-        raise ValueError(f"share: expected {law.radius.size} shares >= 0 with sum 1, found {share.tolist()}")
+        raise Refused(f"share: expected {law.radius.size} shares >= 0 with sum 1, found {share.tolist()}")
     solid = NOMINAL_FRACTION * recipe.width[0] * recipe.width[1] * recipe.depth
     count = np.rint(share * solid / (4.0 / 3.0 * np.pi * law.radius**3)).astype(np.int64)
     if count.sum() == 0 or np.any((count == 0) & (share > 0.0)):
-        raise ValueError(f"bed is empty: the box holds {count.tolist()} particles per class; make it larger")
+        raise Refused(f"bed is empty: the box holds {count.tolist()} particles per class; make it larger")
     return count
 
 
@@ -220,9 +220,9 @@ def make_bed(
     loses energy balance, or does not come to rest within recipe.max_steps (as BedFailed, with the last good state).
     """
     if not recipe.pressure > 0.0 or not recipe.gravity > 0.0:
-        raise ValueError(f"expected pressure > 0 and gravity > 0, found {recipe.pressure}, {recipe.gravity}")
+        raise Refused(f"expected pressure > 0 and gravity > 0, found {recipe.pressure}, {recipe.gravity}")
     if recipe.shakes > 0 and not (recipe.shake_amplitude > 0.0 and recipe.shake_frequency > 0.0):
-        raise ValueError("shaking: expected amplitude > 0 and frequency > 0")
+        raise Refused("shaking: expected amplitude > 0 and frequency > 0")
     run = _Run(law, recipe, seed, progress)
     try:
         return _finish(run, law, recipe)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from graben.errors import NumericsFailed
+from graben.errors import NumericsFailed, Refused
 from graben.mechanics.compiled import kernel
 from graben.mechanics.particles.neighbours import grid_shape
 
@@ -74,7 +74,7 @@ def insert(
         raise ValueError("radius: expected at least one radius, in falling order")
     sides = np.array(width, dtype=np.float64)
     if height <= 2.0 * radius[0]:
-        raise ValueError(f"height: expected more than one grain, {2.0 * radius[0]:.6g} m, found {height:.6g} m")
+        raise Refused(f"height: expected more than one grain, {2.0 * radius[0]:.6g} m, found {height:.6g} m")
     extent = np.array([*sides, height])
     counts = grid_shape(extent, 2.0 * radius[0])
     head = np.full(int(np.prod(counts)), -1, np.int64)

@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
+
 Floats = NDArray[np.float64]
 
 
@@ -58,16 +60,16 @@ class LinearLaw:
             if a.ndim != 1 or a.shape != shape or a.size == 0:
                 raise ValueError(f"{name}: expected one value per class, shape {shape}, found shape {a.shape}")
             if not np.all(np.isfinite(a) & (a > 0.0)):
-                raise ValueError(f"{name}: expected positive finite values, found {a.tolist()}")
+                raise Refused(f"{name}: expected positive finite values, found {a.tolist()}")
             object.__setattr__(self, name, a)
         if not (np.isfinite(self.wall_stiffness) and self.wall_stiffness > 0.0):
-            raise ValueError(f"wall_stiffness: expected a positive value, found {self.wall_stiffness}")
+            raise Refused(f"wall_stiffness: expected a positive value, found {self.wall_stiffness}")
         for name in ("shear_ratio", "friction", "wall_friction", "damping", "shear_damping"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name}: expected zero or a positive value, found {value}")
+                raise Refused(f"{name}: expected zero or a positive value, found {value}")
         if self.rubs and self.shear_ratio == 0.0:
-            raise ValueError("shear_ratio: expected a positive value where friction acts, found 0")
+            raise Refused("shear_ratio: expected a positive value where friction acts, found 0")
 
         k = arrays["normal_stiffness"]
         mass = arrays["density"] * 4.0 / 3.0 * np.pi * arrays["radius"] ** 3

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
 from graben.mechanics.search.swarm import SwarmResult, finite_values, starting
 
 Array = NDArray[np.float64]
@@ -112,9 +113,7 @@ def appso(
     Neither executor nor chunk changes the answer.
     """
     if size < 1 or particles < 1 or generations < 0 or lag < 1 or chunk < 1:
-        raise ValueError(
-            f"appso: expected size, particles, lag, chunk >= 1, found {size}, {particles}, {lag}, {chunk}"
-        )
+        raise Refused(f"appso: expected size, particles, lag, chunk >= 1, found {size}, {particles}, {lag}, {chunk}")
     rng = np.random.Generator(np.random.PCG64(seed))
     x, v = starting(rng, particles, size, starts)
     rule = {

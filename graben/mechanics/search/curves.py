@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
 from graben.mechanics.compiled import kernel
 from graben.mechanics.materials.laws import find, prepare
 from graben.mechanics.materials.point import drive
@@ -164,7 +165,7 @@ class CurveFit:
             stand_in[name] = min(max(1.0, parameter.lower), parameter.upper)
         record_faults = [f for f in record.faults(stand_in) if f[0] != ""]
         if record_faults:
-            raise ValueError("; ".join(f"{name}: expected {text}" for name, text in record_faults))
+            raise Refused("; ".join(f"{name}: expected {text}" for name, text in record_faults))
         self._id = record.id
         self._base = _pack_unchecked(record, stand_in)
         self._slots = np.array([record.index(name) for name in self.free], dtype=np.int64)
@@ -190,9 +191,7 @@ class CurveFit:
         for i, c in enumerate(self.curves):
             r = self._rows[i]
             if c.stress.shape != (r, n) or c.strain.shape != (r, n) or r < 2:
-                raise ValueError(
-                    f"curve {c.name}: expected (steps >= 2, 4) stress and strain, found {c.stress.shape}"
-                )
+                raise Refused(f"curve {c.name}: expected (steps >= 2, 4) stress and strain, found {c.stress.shape}")
             flags[0, i] = [letter == "s" for letter in c.seat]
             flags[1, i] = [letter == "s" for letter in c.control]
             for k in range(n):
@@ -217,12 +216,12 @@ class CurveFit:
                     groups.append(np.full(r, group))
                     group += 1
         if not (np.isfinite(self._targets).all() and np.isfinite(self._zero).all()):
-            raise ValueError("curves: prescribed components must be finite")
+            raise Refused("curves: prescribed components must be finite")
         index = np.concatenate(stress_at).astype(np.int64)
         self._kind, self._where = index[:, 0], tuple(index[:, 1:].T)
         self._goal, self._weight = np.concatenate(goals), np.concatenate(weights)
         if not np.isfinite(self._goal).all():
-            raise ValueError("curves: compared components must be finite")
+            raise Refused("curves: compared components must be finite")
         self.groups = np.concatenate([*groups, group + np.arange(count)]).astype(np.int64)
         self._seats, self._controls = np.ascontiguousarray(flags[0]), np.ascontiguousarray(flags[1])
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
 from graben.mechanics.search.swarm import SwarmResult, finite_values, stratified
 
 Array = NDArray[np.float64]
@@ -49,7 +50,7 @@ def dds(
     """
     trials = evaluations // max(chains, 1)
     if size < 1 or chains < 1 or trials < 1 or not reach > 0.0:
-        raise ValueError(f"dds: expected size, chains >= 1 and evaluations >= chains, found {size}, {chains}")
+        raise Refused(f"dds: expected size, chains >= 1 and evaluations >= chains, found {size}, {chains}")
     rng = np.random.Generator(np.random.PCG64(seed))
     first = min(max(5, round(0.005 * trials)), trials)
     x = stratified(rng, first * chains, size).reshape(first, chains, size)

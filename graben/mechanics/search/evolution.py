@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
 from graben.mechanics.search.swarm import SwarmResult, finite_values, stratified
 
 Array = NDArray[np.float64]
@@ -36,7 +37,7 @@ def differential_evolution(
     from scipy import optimize
 
     if size < 1 or particles < 5:
-        raise ValueError(f"differential_evolution: expected size >= 1 and particles >= 5, found {size}, {particles}")
+        raise Refused(f"differential_evolution: expected size >= 1 and particles >= 5, found {size}, {particles}")
     rng = np.random.Generator(np.random.PCG64(seed))
     population = stratified(rng, particles, size)
     if starts is not None and len(starts):
@@ -112,7 +113,7 @@ def cma_es(
             "cma-es needs the package cmaes: pip install 'graben[search]'", name="cmaes"
         ) from error
     if size < 1 or particles < 5:
-        raise ValueError(f"cma_es: expected size >= 1 and particles >= 5, found {size}, {particles}")
+        raise Refused(f"cma_es: expected size >= 1 and particles >= 5, found {size}, {particles}")
     rng = np.random.Generator(np.random.PCG64(seed))
     # The package refuses a single parameter: a second one without effect stands beside it.
     sizes = max(size, 2)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
+
 Array = NDArray[np.float64]
 
 
@@ -41,7 +43,7 @@ class Box:
             elif log and low <= 0.0:
                 faults.append(f"{name}: a log scale needs a positive lower bound, found {low:g}")
         if faults:
-            raise ValueError("; ".join(faults))
+            raise Refused("; ".join(faults))
 
     @property
     def size(self) -> int:

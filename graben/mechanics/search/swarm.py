@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
+
 Array = NDArray[np.float64]
 
 
@@ -76,7 +78,7 @@ def swarm(
     A particle that would leave the box is put on its face and its velocity there is reversed and halved.
     """
     if size < 1 or particles < 1 or generations < 0:
-        raise ValueError(f"swarm: expected size, particles >= 1, found {size}, {particles}")
+        raise Refused(f"swarm: expected size, particles >= 1, found {size}, {particles}")
     rng = np.random.Generator(np.random.PCG64(seed))
     x, v = starting(rng, particles, size, starts)
     values = finite_values(function(x), particles)

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
+
 Floats = NDArray[np.float64]
 
 
@@ -57,12 +59,12 @@ def contacts_per_area(law: str, diameter: Floats, share: Floats) -> Floats:
     if d.ndim != 1 or d.shape != theta.shape or d.size == 0:
         raise ValueError(f"expected one diameter and one share per class, found shapes {d.shape} and {theta.shape}")
     if not np.all(np.isfinite(d) & (d > 0.0)):
-        raise ValueError(f"diameter: expected positive values, found {d.tolist()}")
+        raise Refused(f"diameter: expected positive values, found {d.tolist()}")
     if not np.all(theta >= 0.0) or abs(float(theta.sum()) - 1.0) > 1e-6:
-        raise ValueError(f"share: expected values >= 0 with sum 1, found {theta.tolist()}")
+        raise Refused(f"share: expected values >= 0 with sum 1, found {theta.tolist()}")
     present = np.flatnonzero(theta > 0.0)
     if present.size > 2:
-        raise ValueError(f"{law} holds for one or two sizes; found {present.size} classes (count them in a bed)")
+        raise Refused(f"{law} holds for one or two sizes; found {present.size} classes (count them in a bed)")
     out = np.zeros_like(d)
     if present.size == 1:
         out[present] = LAWS[law].factor / d[present] ** 2

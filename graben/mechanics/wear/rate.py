@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
+
 Floats = NDArray[np.float64]
 
 # groove area of a ball that ploughs a rigid-plastic half-space: A_g ~ F^(3/2) (see GrooveTable)
@@ -22,7 +24,7 @@ def wear_rates(contacts: Floats, area: float, degree_of_wear: Floats, groove_are
         np.asarray(a, dtype=np.float64) for a in (contacts, degree_of_wear, groove_area)
     )
     if not contacts.shape == degree_of_wear.shape == groove_area.shape:
-        raise ValueError(
+        raise Refused(
             "expected one value per class, found shapes "
             f"{contacts.shape}, {degree_of_wear.shape}, {groove_area.shape}"
         )
@@ -41,10 +43,10 @@ def balanced_forces(contacts: Floats, area: float, load: float, relative: Floats
     """
     contacts, relative = np.asarray(contacts, dtype=np.float64), np.asarray(relative, dtype=np.float64)
     if np.any(relative < 0.0):
-        raise ValueError(f"relative: expected values >= 0, found {relative.tolist()}")
+        raise Refused(f"relative: expected values >= 0, found {relative.tolist()}")
     total = float(np.sum(contacts * relative)) * area
     if not total > 0.0:
-        raise ValueError("no contact carries the load")
+        raise Refused("no contact carries the load")
     return load / total * relative
 
 
@@ -77,12 +79,12 @@ class GrooveTable:
             raise ValueError(f"expected the same number of values each, found {[a.shape for a in arrays.values()]}")
         for name in ("force", "radius", "area"):
             if not np.all(np.isfinite(arrays[name]) & (arrays[name] > 0.0)):
-                raise ValueError(f"{name}: expected positive values, found {arrays[name].tolist()}")
+                raise Refused(f"{name}: expected positive values, found {arrays[name].tolist()}")
         order = np.argsort(arrays["force"] / arrays["radius"] ** 2, kind="stable")
         for name, a in arrays.items():
             object.__setattr__(self, name, a[order])
         if np.any(np.diff(self.force / self.radius**2) <= 0.0):
-            raise ValueError("two grooves have the same force over radius squared; keep one")
+            raise Refused("two grooves have the same force over radius squared; keep one")
 
     def at(self, force: float, radius: float) -> tuple[float, float]:
         """Groove area m2 and degree of wear at a force N of a grain of radius m; force 0 leaves no groove."""

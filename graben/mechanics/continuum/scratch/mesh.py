@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -43,11 +45,11 @@ def graded_axis(start: float, stop: float, fine: tuple[float, float], size: floa
 
     Raises
     ------
-    ValueError : sizes not positive, growth below 1, or the fine range not inside the axis
+    Refused : sizes not positive, growth below 1, or the fine range not inside the axis
     """
     a, b = fine
     if not (size > 0.0 and growth >= 1.0 and start <= a < b <= stop):
-        raise ValueError(f"graded axis [{start}, {stop}]: fine range {fine}, size {size}, growth {growth}")
+        raise Refused(f"graded axis [{start}, {stop}]: fine range {fine}, size {size}, growth {growth}")
     count = max(1, round((b - a) / size))
     lines = np.linspace(a, b, count + 1)
     step = (b - a) / count
