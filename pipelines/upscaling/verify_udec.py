@@ -70,8 +70,10 @@ def figures_of(stress: Any, strain: Any) -> dict[str, float]:
 
 
 def udec_curves() -> dict[float, tuple[Any, Any]]:
-    """Confinement -> stress and strain (states, 2) as xx, yy, compression positive."""
+    """Confinement -> stress and strain since the first state (states, 2) as xx, yy, compression positive."""
     import numpy as np
+
+    from graben.mechanics.search.curves import since_first
 
     with open(HERE / "reference" / "udec_voronoi_granite_fit.csv", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
@@ -80,17 +82,18 @@ def udec_curves() -> dict[float, tuple[Any, Any]]:
         own = [r for r in rows if float(r["confining_stress_pa"]) == confining]
         stress = -np.array([[float(r["stress_xx_pa"]), float(r["stress_yy_pa"])] for r in own])
         strain = -np.array([[float(r["strain_xx"]), float(r["strain_yy"])] for r in own])
-        curves[confining] = (stress, strain)
+        curves[confining] = (stress, since_first(strain))
     return curves
 
 
 def our_curves(path: Path) -> tuple[Any, Any]:
-    """Stress and strain (states, 2) of an artifact of one path, compression positive."""
+    """Stress and strain since the first state (states, 2) of an artifact of one path, compression positive."""
+    from graben.mechanics.search.curves import since_first
     from graben.schemas.artifact import read_artifact
 
     data = read_artifact(path, "curves")
     n = int(data.step_count[0])
-    return -data.stress.values[0, :n, :2], -data.strain.values[0, :n, :2]
+    return -data.stress.values[0, :n, :2], -since_first(data.strain.values[0, :n, :2])
 
 
 def bands(curves: list[tuple[Any, Any]], at: Any) -> dict[str, Any]:

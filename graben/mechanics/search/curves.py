@@ -1,7 +1,8 @@
 """The fit of a law to stress-strain curves: a compiled batch of responses and the weighted residuals.
 
 A curve prescribes some components (strain or stress) and observes others. First the point is brought to the
-curve's first stress state (its strain there counts as zero), then it follows the curve. Where a candidate's
+curve's first stress state, deviatoric or not; strain counts from there, in the curve and in the point alike. Then
+the point follows the curve. Where a candidate's
 path has no solution it keeps its last state and a penalty grows with the part that is missing, so that the
 objective stays finite and continuous.
 """
@@ -27,10 +28,16 @@ from graben.mechanics.materials.point import drive
 Array = NDArray[np.float64]
 
 
+def since_first(strain: Array) -> Array:
+    """Strain (steps, ...) counted from the first state: gauges are zeroed before the cell pressure, after, or never."""
+    strain = np.asarray(strain, dtype=np.float64)
+    return strain - strain[:1]
+
+
 @dataclass(frozen=True)
 class Curve:
     """One measured curve in the plane: stress and strain (steps, 4) = (xx, yy, zz, xy), tensor shear,
-    tension positive.
+    tension positive. Strain may be given from any zero and is kept from the first state.
 
     control: one letter per component, "e" strain or "s" stress prescribed; fit_stress, fit_strain: the
     components compared. The default is Y's: vertical strain and horizontal stress prescribed in plane strain
@@ -45,6 +52,9 @@ class Curve:
     seat: str = "ssee"
     fit_stress: tuple[int, ...] = (1,)
     fit_strain: tuple[int, ...] = (0,)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "strain", since_first(self.strain))
 
 
 @dataclass(frozen=True)
@@ -141,7 +151,7 @@ class CurveFit:
     curves : at least one; length : characteristic length in m; parts : increments per step of a curve
     workers : threads; the numbers do not depend on it
 
-    ValueError when the law refuses the parameters or a curve is not usable.
+    Refused when the law refuses the parameters or a curve is not usable.
     """
 
     law: str
@@ -158,7 +168,7 @@ class CurveFit:
     def __post_init__(self) -> None:
         record = find(self.law)
         if not self.curves:
-            raise ValueError("curves: expected at least one")
+            raise Refused("curves: expected at least one")
         stand_in = dict(self.fixed)
         for name in self.free:
             parameter = record.parameter(name)

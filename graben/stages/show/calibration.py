@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from graben.mechanics.search.curves import since_first
+
 
 def draw(dataset: Any, figure: Any) -> None:
     """Fill a matplotlib figure from an artifact of kind "calibration". Compression is shown positive."""
@@ -28,12 +30,12 @@ def _curves(data: Any, axes: Any, lateral: bool) -> None:
     band = data["member_axial_stress"].values
     for i, name in enumerate(data["curve_name"].values):
         n = int(data["step_count"].values[i])
-        x = -100.0 * data["strain_measured"].values[i, :n, 1]
+        measured, law = (since_first(data[k].values[i, :n]) for k in ("strain_measured", "strain"))
+        x = -100.0 * measured[:, 1]
         colour = colours[i % 10]
         fitted = str(data["role"].values[i]) == "fit"
         if lateral:
-            measured, law = data["strain_measured"].values, data["strain"].values
-            y, z = 100.0 * measured[i, :n, 0], 100.0 * law[i, :n, 0]
+            y, z = 100.0 * measured[:, 0], 100.0 * law[:, 0]
         else:
             y, z = (-1e-6 * data[k].values[i, :n, 1] for k in ("stress_measured", "stress"))
             if not fitted and "axial_stress_error" in data:

@@ -6,13 +6,15 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from graben.mechanics.search.curves import since_first
+
 
 def draw(dataset: xarray.Dataset, figure: Figure) -> None:
     """Compression positive here, as rock engineers plot it; the artifact itself has tension positive."""
     push, wide = figure.subplots(1, 2, sharex=True)
     for k in range(dataset.sizes["path"]):
         n = int(dataset["step_count"][k])
-        strain = dataset["strain"].values[k, :n]
+        strain = since_first(dataset["strain"].values[k, :n])
         stress = dataset["stress"].values[k, :n]
         label = str(dataset["path_name"].values[k])
         confining = float(dataset["confining_stress"][k])

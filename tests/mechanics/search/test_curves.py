@@ -2,6 +2,9 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.materials.point import drive
@@ -142,19 +145,22 @@ def test_no_curve_dominates_by_its_size_its_points_or_the_weights_along_it(last)
 
 
 def test_lateral_strain_counts_as_its_weight_says_on_every_curve():
-    """Lateral strain that is missed entirely costs weight^2 times what missing the stress would, on every curve."""
+    """Lateral strain that is missed entirely (but for the first state, from which it counts) costs weight^2 times what
+    missing the stress would, on every curve."""
     curves = []
     for top in (0.01, 0.1):
         strain, stress = np.zeros((21, 4)), np.zeros((21, 4))
         strain[:, 1] = -np.linspace(0.0, top, 21)
-        strain[:, 0] = 0.1 * top  # the law answers 0 with nu = 0
+        strain[1:, 0] = 0.1 * top  # the law answers 0 with nu = 0
         stress[:, 1] = 1e9 * strain[:, 1]
         curves.append(Curve(f"{top:g}", stress, strain))
     weights = Weights("curve", last=0.5, strain=0.3)
     fit = CurveFit("elastic", {"poisson_ratio": 0.0}, ["young_modulus"], curves, weights)
     r = fit.residuals(np.array([[1e9]]))[0, : fit.points]
     costs = np.array([np.sum(r[fit.groups[: fit.points] == g] ** 2) for g in range(4)])
-    np.testing.assert_allclose(costs, [0.0, 0.3**2 / 2, 0.0, 0.3**2 / 2], atol=1e-12)
+    along = np.linspace(1.0, 0.5, 21) ** 2
+    missed = 0.3**2 / 2 * along[1:].sum() / along.sum()
+    np.testing.assert_allclose(costs, [0.0, missed, 0.0, missed], atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -190,3 +196,29 @@ def test_values_that_do_not_go_together_become_the_nearest_that_do(law, fixed, a
     np.testing.assert_array_equal(asked_for.stress, taken.stress)
     assert asked_for.moved[0] > 0.0 == taken.moved[0]
     assert fit.objective(values[None])[0] > fit.objective(used[None])[0]
+
+
+@settings(max_examples=20, deadline=None, derandomize=True)
+@given(arrays(float, 4, elements=st.floats(-0.01, 0.01)), st.sampled_from(["curve", "all"]))
+def test_it_makes_no_difference_where_the_gauges_were_zeroed(offset, normalise):
+    """Constants on any strain, lateral ones too: the same residuals, errors and predictions."""
+    curves = synthetic(noise=0.02, confinements=(0.5e6, 4e6))
+    moved = [Curve(c.name, c.stress, c.strain + offset * (i + 1)) for i, c in enumerate(curves)]
+    weights = Weights(normalise, strain=1.0)
+    one, other = (CurveFit("drucker-prager", FIXED, FREE, c, weights) for c in (curves, moved))
+    np.testing.assert_allclose(other.residuals(VALUES[None]), one.residuals(VALUES[None]), rtol=0, atol=1e-9)
+    assert other.errors(VALUES)["strain"] == pytest.approx(one.errors(VALUES)["strain"], abs=1e-12)
+    np.testing.assert_array_equal(one.predict(VALUES[None]).strain[0, :, 0, :2], 0.0)
+
+
+def test_a_first_state_under_a_deviator_is_where_strain_begins():
+    """A log that begins at half of the load: the point is seated at that stress, and both count strain from there."""
+    e, nu, cell = 18e9, 0.25, 8e6
+    q = np.linspace(20e6, 40e6, 21)
+    stress, strain = np.zeros((21, 4)), np.zeros((21, 4))
+    stress[:, [0, 2]], stress[:, 1] = -cell, -cell - q
+    strain[:, 1], strain[:, 0] = -q / e, nu * q / e
+    strain[:, 2] = strain[:, 0]
+    curve = Curve("late", stress, strain, control="sese", seat="ssse")
+    fit = CurveFit("elastic", {}, ["young_modulus", "poisson_ratio"], [curve])
+    assert fit.objective(np.array([[e, nu]]))[0] < 1e-16
