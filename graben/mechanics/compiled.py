@@ -1,64 +1,86 @@
 """`kernel`: numba's njit with a disk cache that notices edits in other files.
 
-numba's own cache compares a function with its own source file only. A kernel that calls a law in another
-file would keep running the old law after that file changed. Here the cache folder carries a digest of every
-source a kernel can reach, so an edit leads to an empty folder and a fresh compilation, never to stale physics.
+numba's own cache compares a function with its own source file only. A kernel that calls a law in another file would
+keep running the old law after that file changed. Here the key of a compiled kernel covers every source of mechanics
+that its module imports, directly or not, so an edit leads to a fresh compilation, never to stale physics.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
-import os
-import tempfile
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numba
 
+from graben.mechanics.kernel_cache import KernelCache
+
 _MECHANICS = Path(__file__).parent
-# Rooms whose kernels are called from other rooms; every digest covers them.
-_SHARED_ROOMS = ("materials",)
-
-
-@cache
-def _cache_folder(room: str) -> str:
-    """Folder for the compiled kernels of one room of mechanics/, named after the digest of its sources."""
-    digest = hashlib.sha256()
-    rooms = sorted({*_SHARED_ROOMS, room})
-    for path in sorted(p for r in rooms for p in (_MECHANICS / r).rglob("*.py")):
-        digest.update(path.read_bytes())
-    name = f"{room}-{digest.hexdigest()[:16]}"
-    in_tree = _MECHANICS / "__pycache__" / "kernels" / name
-    try:
-        in_tree.mkdir(parents=True, exist_ok=True)
-        if os.access(in_tree, os.W_OK):
-            return str(in_tree)
-    except OSError:
-        pass  # a read-only installation: fall back to the user's cache
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    for candidate in (Path(base) / "graben" / name, Path(tempfile.gettempdir()) / "graben" / name):
-        try:
-            candidate.mkdir(parents=True, exist_ok=True)
-            return str(candidate)
-        except OSError:
-            continue
-    raise RuntimeError(f"no writable folder for compiled kernels (tried {in_tree} and {base})")
+_PACKAGE = "graben.mechanics"
+# Statements that import from graben, wherever in a file: parsing whole files would slow every start.
+_FROM = rb"from[ \t]+graben[\w.]*[ \t]+import[ \t]*(?:\([^)]*\)|(?:[^\n(\\]|\\\n)+)"
+_IMPORTS = re.compile(rb"^[ \t]*(" + _FROM + rb"|import[ \t][^\n]*\bgraben\b[^\n]*)", re.MULTILINE)
 
 
 def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """Compile `function` in nopython mode with the cache described above; options are those of numba.njit.
-
-    Functions compiled with and without ``parallel=True`` must have different names: the disk cache does not
-    tell them apart.
-    """
+    """Compile `function` in nopython mode with the cache described above; options are those of numba.njit."""
     if function is None:
         return lambda f: kernel(f, **options)
-    room = Path(function.__code__.co_filename).resolve().relative_to(_MECHANICS).parts[0]
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _cache_folder(room)
+    dispatcher = numba.njit(**options)(function)
+    dispatcher._cache = KernelCache(function, f"{digest_of_sources(function.__module__)} {sorted(options.items())}")
+    return dispatcher
+
+
+@cache
+def digest_of_sources(module: str) -> str:
+    """SHA-256 of the source of a module of mechanics and of all that it imports from mechanics, directly or not."""
+    found, waiting = {module}, [module]
+    while waiting:
+        more = _imported(waiting.pop()) - found
+        found |= more
+        waiting += more
+    return hashlib.sha256("".join(f"{name} {_digest(name)}\n" for name in sorted(found)).encode()).hexdigest()
+
+
+@cache
+def _sources() -> dict[str, Path]:
+    """Every module of mechanics and its file."""
+    found = {}
+    for path in _MECHANICS.rglob("*.py"):
+        parts = path.relative_to(_MECHANICS).with_suffix("").parts
+        found[".".join((_PACKAGE, *(parts[:-1] if parts[-1] == "__init__" else parts)))] = path
+    return found
+
+
+@cache
+def _read(module: str) -> bytes:
+    return _sources()[module].read_bytes()
+
+
+@cache
+def _digest(module: str) -> str:
+    return hashlib.sha256(_read(module)).hexdigest()
+
+
+@cache
+def _imported(module: str) -> frozenset[str]:
+    """The modules of mechanics that one of them imports, wherever in its file."""
+    return frozenset(name for text in _IMPORTS.findall(_read(module)) for name in _names(text) if name in _sources())
+
+
+def _names(statement: bytes) -> Iterator[str]:
+    """Dotted names that may be modules: `from a import b` may mean a.b."""
     try:
-        return numba.njit(cache=True, **options)(function)
-    finally:
-        numba.config.CACHE_DIR = before
+        tree = ast.parse(statement)
+    except SyntaxError:
+        return  # a line of a docstring
+    for node in tree.body:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module is not None:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
