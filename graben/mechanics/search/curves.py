@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 def since_first(strain: Array) -> Array:
-    """Strain (steps, ...) counted from the first state: gauges are zeroed before the cell pressure, after, or never."""
+    """Strain (steps, ...) counted from the first state: gauges are zeroed before the cell pressure, or after."""
     strain = np.asarray(strain, dtype=np.float64)
     return strain - strain[:1]
 

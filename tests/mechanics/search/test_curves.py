@@ -145,7 +145,7 @@ def test_no_curve_dominates_by_its_size_its_points_or_the_weights_along_it(last)
 
 
 def test_lateral_strain_counts_as_its_weight_says_on_every_curve():
-    """Lateral strain that is missed entirely (but for the first state, from which it counts) costs weight^2 times what
+    """Lateral strain that is missed from the first state on costs weight^2 times what
     missing the stress would, on every curve."""
     curves = []
     for top in (0.01, 0.1):
