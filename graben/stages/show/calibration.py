@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -73,12 +74,12 @@ def _parameters(data: Any, axes: Any) -> None:
     def place(v: np.ndarray) -> np.ndarray:
         safe = np.where(log, np.clip(v, low, None), 1.0)
         with np.errstate(invalid="ignore"):
-            return np.where(log, np.log(safe / np.where(log, low, 1.0)) / np.log(np.where(log, high / low, np.e)),
+            return np.where(log, np.log(safe / np.where(log, low, 1.0)) / np.log(np.where(log, high / low, math.e)),
                             (v - low) / (high - low))  # fmt: skip
 
     at = place(value)
     spread = np.nan_to_num(
-        np.where(log, error / value / np.log(np.where(log, high / low, np.e)), error / (high - low))
+        np.where(log, error / value / np.log(np.where(log, high / low, math.e)), error / (high - low))
     )
     rows = np.arange(len(names))
     for m in members:
