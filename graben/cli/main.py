@@ -7,6 +7,7 @@ from importlib import import_module
 import click
 
 import graben
+from graben.cli.options import Program
 
 TOOLS = {
     "dem-run": ("graben.cli.dem_run:main", "Run a scene of blocks or grains."),
@@ -23,7 +24,7 @@ TOOLS = {
 }
 
 
-class _Umbrella(click.Group):
+class _Umbrella(Program, click.Group):
     """Imports a tool only when it is called, so that help answers at once."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:

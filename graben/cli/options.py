@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import json
 import logging
-import signal
 import sys
-import threading
 import time
+import traceback
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,24 +19,38 @@ from typing import Any
 
 import click
 
+from graben import interrupts
+
 FILE = click.Path(path_type=Path)
 
 
-class Tool(click.Command):
+class Program:
+    """What is started from a shell answers signals from its first moment; see `graben.interrupts`."""
+
+    def main(self, args: Any = None, *rest: Any, **extra: Any) -> Any:
+        if args is None:
+            interrupts.take()
+        return super().main(args, *rest, **extra)  # type: ignore[misc]
+
+
+class Tool(Program, click.Command):
     """A click command whose failures become exit codes 2, 3 and 130, never a traceback without --debug."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        _end_as_interrupted()
         try:
-            return super().invoke(ctx)
-        except (click.ClickException, click.exceptions.Exit, click.Abort):
-            raise
+            with interrupts.at_work():
+                return super().invoke(ctx)
         except (Exception, KeyboardInterrupt) as error:
-            if ctx.params.get("debug"):
+            interrupted = interrupts.came() or isinstance(error, KeyboardInterrupt)
+            if not interrupted and isinstance(error, click.ClickException | click.exceptions.Exit | click.Abort):
                 raise
+            if ctx.params.get("debug"):
+                if not interrupted:
+                    raise
+                traceback.print_exc()
             from graben.stages.outcome import explain
 
-            outcome = explain(error)
+            outcome = explain(KeyboardInterrupt() if interrupted else error)
             name = ctx.info_name or "graben"
             if outcome is None:
                 click.echo(f"{name}: a fault of the program: {type(error).__name__}: {error}", err=True)
@@ -47,16 +60,6 @@ class Tool(click.Command):
             for line in lines:
                 click.echo(f"{name}: {line}", err=True)
             ctx.exit(code)
-
-
-def _end_as_interrupted() -> None:
-    """Let SIGTERM (make and schedulers send it) unwind like Ctrl-C, so that half-made files are removed."""
-
-    def interrupt(number: int, frame: object) -> None:
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, interrupt)
 
 
 @dataclass(frozen=True)

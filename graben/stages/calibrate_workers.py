@@ -6,16 +6,15 @@ import math
 import pickle
 import zlib
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from multiprocessing import get_context
 
 import numpy as np
 from numpy.typing import NDArray
 
-from graben.stages.workers import PATIENCE_S, await_worker, connect
+from graben.stages.workers import PATIENCE_S, await_worker, connect, worker_processes
 
 Array = NDArray[np.float64]
 
@@ -60,7 +59,7 @@ def workers_of(search: str, workers: int, particles: int, cluster: str | None) -
             yield Workers(client.get_executor(pure=False), math.ceil(particles / (2 * lanes)))
     elif search == "appso" and workers > 1:
         # Processes begun afresh: a fork of a process with compiled threads may hang.
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        with worker_processes(workers, "spawn") as pool:
             yield Workers(pool, math.ceil(particles / workers))
     else:
         yield Workers()

@@ -6,9 +6,14 @@ not finished is done again by another.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import active_children, get_context, parent_process
 from typing import TYPE_CHECKING, Any
 
 from graben.errors import BadInput, Fault
@@ -61,13 +66,46 @@ def compute(
     return _in_processes(work, tasks, processes, done)
 
 
+@contextmanager
+def worker_processes(count: int, start: str | None = None) -> Iterator[ProcessPoolExecutor]:
+    """Worker processes that end with this block: at once where it is left by an exception.
+
+    start : how they are begun ("spawn", ...); None for the usual way of the system
+    """
+    before = set(active_children())
+    pool = ProcessPoolExecutor(count, mp_context=get_context(start), initializer=_begin_worker)
+    try:
+        yield pool
+    except BaseException:
+        for worker in set(active_children()) - before:
+            worker.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _begin_worker() -> None:
+    """Leave Ctrl-C to the process that began this one; end when asked to, and when that process is gone."""
+    for name, action in (("SIGINT", signal.SIG_IGN), ("SIGTERM", signal.SIG_DFL), ("SIGHUP", signal.SIG_DFL)):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), action)
+    parent = parent_process()
+
+    def follow() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=follow, daemon=True).start()
+
+
 def _in_processes(work: Callable[[Any], Any], tasks: Sequence[Any], processes: int, done: Done) -> list[Any]:
     results: dict[int, Any] = {}
     for attempt in range(_ATTEMPTS):
         left = [k for k in range(len(tasks)) if k not in results]
         if not left:
             break
-        with ProcessPoolExecutor(min(processes, len(left))) as pool:
+        with worker_processes(min(processes, len(left))) as pool:
             futures: dict[int, Future[Any]] = {k: pool.submit(work, tasks[k]) for k in left}
             for k, future in futures.items():
                 try:
