@@ -41,6 +41,10 @@ class BadInput(GrabenError, ValueError):
         return BadInput, (self.faults,)  # as it is when it comes from a worker process
 
 
+class Incomplete(BadInput):
+    """The only faults of a scene are files that the command line may still name: no fault of the scene by itself."""
+
+
 class Refused(GrabenError, ValueError):
     """Mechanics cannot take this input; says what was expected, without file or key."""
 

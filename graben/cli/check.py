@@ -3,21 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from graben.cli.options import FILE, Session, Tool, session_options
+
+if TYPE_CHECKING:
+    from graben.errors import Fault
 
 
 @click.command("check", cls=Tool)
 @click.argument("files", nargs=-1, required=True, type=FILE, metavar="FILE...")
 @session_options
 def main(session: Session, files: tuple[Path, ...]) -> None:
-    """Check scene files (.toml) and artifacts (.nc); report every fault. Exit code 2 if there is one."""
-    from graben.errors import BadInput
-    from graben.schemas.check import check
+    """Check scene and material files (.toml) and artifacts (.nc) as their stages would before work.
 
-    faults = [fault for file in files for fault in check(file)]
-    if faults:
-        raise BadInput(faults)
-    session.report({str(file): "no fault" for file in files})
+    Reports every fault; exit code 2 if there is one.
+    """
+    from graben.errors import BadInput
+    from graben.stages.check import examine
+
+    found = {str(file): examine(file) for file in files}
+    if any(faults for faults, _ in found.values()):
+        raise BadInput([fault for faults, _ in found.values() for fault in faults])
+    session.report({file: _words(absent) for file, (_, absent) in found.items()})
+
+
+def _words(absent: list[Fault]) -> str:
+    """Needs of the command line do not make a scene faulty."""
+    needs = "; ".join(f"{fault.key}: {fault.expected}" for fault in absent)
+    return f"no fault; to run it needs {needs}" if needs else "no fault"

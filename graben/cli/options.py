@@ -71,12 +71,17 @@ class Session:
     verbose: int
 
     def report(self, headline: Mapping[str, Any]) -> None:
-        """Print the headline numbers on stdout: one JSON object, or aligned lines for a person."""
+        """Print the headline numbers on stdout: one JSON object, or aligned lines for a person.
+
+        A person finds `warnings` on stderr, below them.
+        """
         if self.as_json:
             click.echo(json.dumps(headline, default=_plain, allow_nan=False))
         elif not self.quiet:
-            for line in _lines(headline):
+            for line in _lines({name: value for name, value in headline.items() if name != "warnings"}):
                 click.echo(line)
+            for text in headline.get("warnings", []):
+                click.echo(f"warning: {text}", err=True)
 
     @contextmanager
     def progress(self) -> Iterator[Callable[[float, str], None]]:

@@ -34,13 +34,15 @@ def _cpu_seconds() -> float:
 class Record:
     """Provenance and cost of one run. Begin it when a stage starts; `attributes` closes the clocks.
 
-    ``cost`` takes the stage's own figures (steps, elements, energy error, ...), keys with units.
+    ``cost`` takes the stage's own figures (steps, elements, energy error, ...), keys with units; ``warnings`` what a
+    person should know before trusting the result.
     """
 
     scene_text: str = ""
     seed: int | None = None
     inputs: dict[str, str] = field(default_factory=dict)
     cost: dict[str, Any] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
     _wall: float = field(default_factory=time.perf_counter)
     _cpu: float = field(default_factory=_cpu_seconds)
 
@@ -74,4 +76,5 @@ class Record:
             "seed": -1 if self.seed is None else self.seed,
             "inputs": json.dumps(self.inputs, sort_keys=True),
             "cost": json.dumps(self.closed_cost(), default=float),
+            "warnings": "\n".join(self.warnings),
         }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,8 @@ from graben.stages.blocks_biaxial import Biaxial
 from graben.stages.blocks_joints import joints_of_sets
 from graben.stages.blocks_output import write_vtk
 from graben.stages.blocks_programme import Rising
+from graben.stages.blocks_sizes import sizes_of
+from graben.stages.estimate import Estimate, refuse_too_large
 from graben.stages.record import Progress, Record, silent
 
 # Steps of loading for each fidelity; their measured trade is in docs/dem-run-blocks.md
@@ -52,24 +55,10 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
     BadInput : the mechanics refuse the scene; NumericsFailed : the run had to stop. What was saved until then is
     written as NAME.partial.nc beside the output.
     """
+    prepared = prepare(scene)
+    tessellation, model, test = prepared.tessellation, prepared.model, prepared.test
     record = Record.begin(scene)
     parts = blocks_checkpoint.read(output, scene) if restart else None
-    steps = scene.numerics.steps or FIDELITY[scene.fidelity]
-    programme = scene.programme
-    test: Biaxial | Rising
-    try:
-        tessellation = _tessellation(scene)
-        if programme is None:
-            model = _model(scene, tessellation, scene.loading.duration / steps, (0.0, 0.0))
-            _put_stress_in(scene, model)
-            test = Biaxial(scene, model, steps)
-        else:
-            gravity = (programme.horizontal, programme.vertical)
-            model = _model(scene, tessellation, programme.end / steps, gravity)
-            _put_stress_in(scene, model)
-            test = Rising(scene, model, steps)
-    except Refused as error:
-        raise BadInput(Fault(str(scene.source.path), "", "", f"a scene that can be run ({error})")) from error
     progress(0.0, f"{tessellation.size} blocks come to rest")
     if parts is None:
         test.begin(progress)
@@ -114,6 +103,42 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         write_vtk(output, arrays)
     keeper.remove()
     return headline
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A checked scene whose work has not begun."""
+
+    tessellation: Tessellation
+    model: BlockModel
+    test: Biaxial | Rising
+    sizes: list[Estimate]
+
+
+def prepare(scene: BlocksScene) -> Prepared:
+    """Blocks, joints and loading of a scene, after every check that the run makes; nothing has moved.
+
+    Raises
+    ------
+    BadInput : the scene is too large, or the mechanics refuse it
+    """
+    file, programme = scene.source.path, scene.programme
+    steps = scene.numerics.steps or FIDELITY[scene.fidelity]
+    sizes = sizes_of(scene, steps)
+    refuse_too_large(file, sizes)
+    if programme is None and scene.loading.states > steps + 1:
+        expected = f"at most {steps + 1}: one state a step"
+        raise BadInput(Fault(str(file), "loading.states", str(scene.loading.states), expected))
+    duration = scene.loading.duration if programme is None else programme.end
+    gravity = (0.0, 0.0) if programme is None else (programme.horizontal, programme.vertical)
+    try:
+        tessellation = _tessellation(scene)
+        model = _model(scene, tessellation, duration / steps, gravity)
+        _put_stress_in(scene, model)
+        test = Biaxial(scene, model, steps) if programme is None else Rising(scene, model, steps)
+    except Refused as error:
+        raise BadInput(Fault(str(file), "", "", f"a scene that can be run ({error})")) from error
+    return Prepared(tessellation, model, test, sizes)
 
 
 def _bring_back(path: Path, model: BlockModel, test: Biaxial | Rising, parts: dict[str, Any]) -> None:

@@ -29,6 +29,7 @@ class Biaxial:
     )
 
     def __init__(self, scene: BlocksScene, model: BlockModel, steps: int) -> None:
+        rectangle_sides(model.bodies.outline)  # refuses any other outline before work begins
         self.scene, self.model, self.steps = scene, model, steps
         self.rest = np.zeros(2)  # unbalanced force ratio of consolidation, its steps
         self.check = _force_check(scene, steps)

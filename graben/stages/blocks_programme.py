@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.blocks import programme as mechanics
 from graben.mechanics.blocks.courses import Course
 from graben.mechanics.blocks.excavation import blocks_in, excavate
@@ -21,7 +22,7 @@ from graben.stages.record import Progress
 
 
 class Rising:
-    """The test that a scene's [programme] describes. ValueError where a segment is not on the outline."""
+    """The test that a scene's [programme] describes. BadInput where a segment is not on the outline."""
 
     ERRORS = ("energy_error", "kinetic_over_stored_energy", "inertia_over_load")
 
@@ -36,29 +37,35 @@ class Rising:
         self.rest = np.zeros(2)
         self.carried = model.bodies.position.copy()
         self.next_save = 0.0
-        b = model.bodies
-        for support in self.programme.supports:
+        b, file = model.bodies, str(scene.source.path)
+        faults = []
+        for k, support in enumerate(self.programme.supports):
             at = mechanics.on_segment(b, np.array(support.start), np.array(support.end))
             if not at.any():
-                raise ValueError(f"support {support.name!r}: no part of the outline lies on its segment")
+                expected = "a segment that holds a part of the outline"
+                faults.append(Fault(file, f"programme.supports.{k}", support.name, expected))
             for axis, name in enumerate("xy"):
                 if support.fix in (name, "both"):
                     model.hold(at, axis)
         self.loads = Loads(len(b.position))
-        for load in self.programme.loads:
+        for k, load in enumerate(self.programme.loads):
             try:
                 unit = mechanics.pressure_forces(b, np.array(load.start), np.array(load.end))
-            except ValueError as error:
-                raise ValueError(f"load {load.name!r}: {error}") from error
+            except Refused as error:
+                faults.append(Fault(file, f"programme.loads.{k}", load.name, f"a segment of the outline ({error})"))
+                continue
             self.loads.add(unit, _course(load))
         self.loads.begin(model, 0.0)
         self._weight = model.weight.copy()
         self._digs = sorted(self.programme.excavations, key=lambda dig: dig.time)
         self.dug = 0
         self.released: list[tuple[float, float, np.ndarray]] = []  # from, over, forces
-        for dig in self._digs:
+        for k, dig in enumerate(self.programme.excavations):
             if not blocks_in(model, np.array(dig.polygon)).any():
-                raise ValueError(f"excavation {dig.name!r}: no block has its middle in its polygon")
+                expected = "a polygon that holds the middle of a block"
+                faults.append(Fault(file, f"programme.excavations.{k}", dig.name, expected))
+        if faults:
+            raise BadInput(faults)
 
     def begin(self, progress: Progress) -> None:
         """Bring the body to rest under its weight and steady pressures."""

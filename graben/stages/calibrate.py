@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from graben.errors import BadInput, Fault
+from graben.errors import BadInput, Fault, Incomplete, Refused
 from graben.mechanics.materials.laws import LAWS
+from graben.mechanics.search.curves import Curve
 from graben.mechanics.search.first_state import settle
 from graben.mechanics.search.identifiability import identify
 from graben.schemas.artifact import write_artifact
@@ -19,13 +21,61 @@ from graben.schemas.scenes.material import material_text, write_material
 from graben.stages.calibrate_compare import Candidate, cross_validate, label, rivals
 from graben.stages.calibrate_compare import compare as compared
 from graben.stages.calibrate_output import arrays_of, distinct, headline_of, note_of
-from graben.stages.calibrate_problem import problem_of
+from graben.stages.calibrate_problem import Problem, problem_of, sizes_of
 from graben.stages.calibrate_state import State, digest_of
 from graben.stages.calibrate_workers import workers_of
+from graben.stages.estimate import Estimate, refuse_too_large
 from graben.stages.measured import Reading, read_measured
 from graben.stages.record import Progress, Record, silent
 
 _NEAR = 1.1  # members of the ensemble: objective up to this multiple of the best
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A checked scene whose search has not begun: files of curves, its problem and those of rivals, curves, sizes."""
+
+    sources: list[Path]
+    problem: Problem
+    others: list[Problem]
+    measured: list[Curve]
+    unseen: list[Curve]
+    sizes: list[Estimate]
+
+
+def prepare(
+    scene: CalibrateScene,
+    curves: Sequence[Path] = (),
+    validate: Sequence[Path] = (),
+    compare: Sequence[Path] = (),
+    threads: int = 1,
+) -> Prepared:
+    """Curves and problems of a scene, after every check that the run makes; parameters as in `run`.
+
+    Raises
+    ------
+    BadInput : the scene, a curve or a rival has faults, or the search would be too large
+    Incomplete : no other fault than that the command line must name the curves
+    """
+    file, names = scene.source.path, list[str]()
+    problem = problem_of(scene, file, label(file, names), threads)
+    others = rivals(compare, scene, names, threads)
+    sources = [Path(p) for p in (curves or scene.curves)]
+    if not sources:
+        expected = "at least one file of curves, here or on the command line"
+        raise Incomplete(Fault(str(file), "curves", "[]", expected))
+    reading = Reading(scene.test, scene.csv.sign, scene.csv.allow_tension)
+    every = read_measured([*sources, *validate], reading)
+    unseen = read_measured(validate, reading) if validate else []
+    measured = every[: len(every) - len(unseen)]
+    sizes = sizes_of(problem, len(others), measured)
+    refuse_too_large(file, sizes)
+    for p in (problem, *others):
+        try:
+            p.check(measured)
+        except Refused as error:
+            raise BadInput(Fault(str(p.scene.source.path), "", "", f"a law that can be fitted ({error})")) from error
+    return Prepared(sources, problem, others, measured, unseen, sizes)
 
 
 def run(
@@ -62,21 +112,12 @@ def run(
     material_path = output.with_suffix("").with_suffix(".material.toml")
     refuse_existing(output, overwrite)
     refuse_existing(material_path, overwrite)
-    sources = [Path(p) for p in (curves or scene.curves)]
-    if not sources:
-        raise BadInput(
-            Fault(str(scene_path), "curves", "[]", "at least one file of curves, here or on the command line")
-        )
-    record = Record.begin(scene, [p for p in [*sources, *validate, *compare] if p.is_file()])
-    reading = Reading(scene.test, scene.csv.sign, scene.csv.allow_tension)
-    measured = read_measured([*sources, *validate], reading)
-    unseen = read_measured(validate, reading) if validate else []
-    measured = measured[: len(measured) - len(unseen)]
-    names: list[str] = []
     # Processes and clusters share out whole candidates; threads within them would only quarrel.
     threads = scene.workers if scene.search != "appso" and cluster is None else 1
-    problem = problem_of(scene, scene_path, label(scene_path, names), threads)
-    others = rivals(compare, scene, names, threads)
+    prepared = prepare(scene, curves, validate, compare, threads)
+    sources, problem, others = prepared.sources, prepared.problem, prepared.others
+    measured, unseen = prepared.measured, prepared.unseen
+    record = Record.begin(scene, [*sources, *validate, *compare])
     texts = [p.scene.source.effective_text for p in (problem, *others)]
     folds = scene.cross_validation or bool(others)
     share = 0.95 / (1 + folds + 2 * len(others))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from graben.errors import BadInput, Fault
 from graben.mechanics.materials.laws import LAWS
+from graben.mechanics.search.choices import fewest
 from graben.mechanics.search.curves import Curve, CurveFit, Weights
 from graben.mechanics.search.multistart import Found, Plan, search
 from graben.mechanics.search.objective import Objective, Priors
@@ -18,10 +20,12 @@ from graben.mechanics.search.space import Box
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.stages.calibrate_state import State
 from graben.stages.calibrate_workers import Sent
+from graben.stages.estimate import Estimate, work
 
 # starts, particles, generations, refined particles of each start, increments between two points
 FIDELITY = {"draft": (1, 24, 60, 3, 1), "standard": (4, 24, 100, 4, 2), "reference": (12, 48, 200, 6, 4)}
 
+_POINT_BYTES = 200.0  # of one point of one particle: prediction and residuals
 _ELASTIC = ("young_modulus", "poisson_ratio")
 _ELASTIC_PART = 0.3  # of a curve's largest change of stress: where its elastic stage ends
 Tell = Callable[[float, str], None]
@@ -78,34 +82,52 @@ class Problem:
         )
         return objective, replace(found, evaluations=found.evaluations + evaluations)
 
-    def _staged(self, curves: Sequence[Curve], plan: Plan, state: State, task: str) -> tuple[np.ndarray, int]:
-        """A guess (1, k) from one group of parameters after the other, Y 5.2: elastic ones from the beginnings of
-        the curves, hardening without damage up to their peaks, damage from whole curves; and its evaluations.
-        """
+    def _stages(self, curves: Sequence[Curve]) -> list[tuple[str, list[str], list[Curve], dict[str, Any]]]:
+        """Name, free parameters, curves and changes of the fit of each stage that has a parameter."""
         law = LAWS[self.scene.law]
         damage = {p.name for p in law.parameters if p.when is not None and p.when[0] == "damage"}
         amounts = {n: 0.0 for n in self.box.names if n.endswith("_damage") and n not in damage}
         free = self.box.names
-        groups = [
+        groups: list[tuple[str, list[str], list[Curve], dict[str, Any]]] = [
             ("elastic", [n for n in free if n in _ELASTIC], _beginnings(curves), {"law": "elastic"}),
             ("hardening", [n for n in free if n not in {*_ELASTIC, *damage, *amounts}], _rises(curves), {}),
             ("damage", [n for n in free if n in damage or n in amounts], list(curves), {}),
         ]
+        return [stage for stage in groups if stage[1]]
+
+    def _stage_fit(
+        self, stage: str, names: list[str], part: Sequence[Curve], changes: dict[str, Any], known: dict[str, float]
+    ) -> CurveFit:
+        law = LAWS[self.scene.law]
+        damage = {p.name for p in law.parameters if p.when is not None and p.when[0] == "damage"}
+        fixed = {**self.fixed, **known}
+        if stage == "elastic":
+            fixed = {n: v for n, v in fixed.items() if n in _ELASTIC}
+        elif stage == "hardening":
+            amounts = {n: 0.0 for n in self.box.names if n.endswith("_damage") and n not in damage}
+            fixed = {n: v for n, v in fixed.items() if n not in damage} | amounts
+            fixed |= {"damage": "none"} if damage else {}
+        return self.fit(part, **{"fixed": fixed, "free": names} | changes)
+
+    def check(self, curves: Sequence[Curve]) -> None:
+        """Raise Refused where the law or a curve cannot be fitted; nothing is searched."""
+        self.fit(curves)
+        known: dict[str, float] = {}
+        for stage, names, part, changes in self._stages(curves) if self.scene.staged else []:
+            self._stage_fit(stage, names, part, changes, known)
+            known |= {n: float(self.box.lower[self.box.names.index(n)]) for n in names}
+
+    def _staged(self, curves: Sequence[Curve], plan: Plan, state: State, task: str) -> tuple[np.ndarray, int]:
+        """A guess (1, k) from one group of parameters after the other, Y 5.2: elastic ones from the beginnings of
+        the curves, hardening without damage up to their peaks, damage from whole curves; and its evaluations.
+        """
         known: dict[str, float] = {}
         evaluations = 0
         short = replace(plan, starts=1, generations=min(plan.generations, 40), refine_best=2)
-        for stage, names, part, changes in groups:
-            if not names:
-                continue
-            fixed = {**self.fixed, **known}
-            if stage == "elastic":
-                fixed = {n: v for n, v in fixed.items() if n in _ELASTIC}
-            elif stage == "hardening":
-                fixed = {n: v for n, v in fixed.items() if n not in damage} | amounts
-                fixed |= {"damage": "none"} if damage else {}
+        for stage, names, part, changes in self._stages(curves):
             at = np.array([self.box.names.index(n) for n in names])
             box = Box.of(names, self.box.lower[at], self.box.upper[at], self.box.log[at])
-            fit = self.fit(part, **{"fixed": fixed, "free": names} | changes)
+            fit = self._stage_fit(stage, names, part, changes, known)
             own = np.isin(self.priors.columns, at)
             priors = Priors(
                 np.array([int(np.flatnonzero(at == c)[0]) for c in self.priors.columns[own]], dtype=np.int64),
@@ -158,6 +180,13 @@ def problem_of(scene: CalibrateScene, scene_path: Path, name: str, threads: int 
         if parameter:
             key = f"free.{parameter}" if parameter in names else f"fixed.{parameter}"
             faults.append(Fault(str(scene_path), key, "" if parameter in stand_in else "(absent)", text))
+    if scene.search == "cma-es" and find_spec("cmaes") is None:
+        expected = "the package cmaes: pip install 'graben[search]'"
+        faults.append(Fault(str(scene_path), "search", scene.search, expected))
+    plan = plan_of(scene)
+    if plan.particles < fewest(scene.search):
+        expected = f"at least {fewest(scene.search)} for {scene.search}"
+        faults.append(Fault(str(scene_path), "swarm.particles", str(plan.particles), expected))
     if faults:
         raise BadInput(faults)
     box = Box.of(names, lower, upper, log)
@@ -167,9 +196,23 @@ def problem_of(scene: CalibrateScene, scene_path: Path, name: str, threads: int 
         point = np.array([m if v is None else v for v, m in zip(initial, middle)])
         guess = box.to_unit(point)[None]
     _starts, _particles, _generations, _refined, increments = FIDELITY[scene.fidelity]
-    return Problem(
-        name, scene, box, fixed, _priors(scene, box), plan_of(scene), scene.increments or increments, guess, threads
-    )
+    return Problem(name, scene, box, fixed, _priors(scene, box), plan, scene.increments or increments, guess, threads)
+
+
+def sizes_of(problem: Problem, rivals: int, curves: Sequence[Curve]) -> list[Estimate]:
+    """Evaluations of all searches, and what the curves of one generation keep."""
+    plan, scene = problem.plan, problem.scene
+    points = float(sum(len(c.stress) for c in curves))
+    refined = plan.refine_best * plan.iterations * (problem.box.size + 3.0)
+    evaluations = plan.starts * (plan.particles * (plan.generations + 1.0) + refined)
+    folds = len(curves) if scene.cross_validation or rivals else 0
+    evaluations *= (1.0 + 0.5 * folds) * (1.0 + rivals)
+    key, value = "swarm.particles", str(plan.particles)
+    return [
+        Estimate("particles", plan.particles, plan.particles * points * _POINT_BYTES, key, value),
+        work("evaluations times increments", evaluations * points, problem.increments, "swarm.generations",
+             str(plan.generations)),
+    ]  # fmt: skip
 
 
 def plan_of(scene: CalibrateScene) -> Plan:

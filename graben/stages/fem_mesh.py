@@ -13,40 +13,39 @@ from graben.mechanics.continuum.paved import paved_mesh
 from graben.mechanics.continuum.sizing import SizeField
 from graben.schemas.scenes.fem import FemScene
 
-MOST_ELEMENTS = 400_000
-
 
 def mesh_of(scene: FemScene) -> QuadMesh:
     """Build or read the mesh.
 
     Raises
     ------
-    BadInput : patches or outline cannot be meshed, the file holds no plane quads, or the mesh would be far too large
+    BadInput : patches or outline cannot be meshed, or the file holds no plane quads
     """
     mesh, file = scene.mesh, str(scene.source.path)
-    factor = {"draft": mesh.draft_factor, "standard": 1.0, "reference": mesh.reference_factor}[scene.fidelity]
-    size = SizeField(
-        size=factor * mesh.size,
-        segments=np.array([[r.start, r.end] for r in mesh.refine], dtype=float).reshape(-1, 2, 2),
-        near_size=factor * np.array([r.size for r in mesh.refine], dtype=float),
-        growth=np.array([r.growth for r in mesh.refine], dtype=float),
-    )
+    size = size_field(scene)
     if mesh.method == "file":
         assert mesh.file is not None  # the scene's own check
         return read_quads(mesh.file)
     shape = np.array(mesh.outline if mesh.method == "paved" else mesh.corners, dtype=float)
     key = "mesh.outline" if mesh.method == "paved" else "mesh.patches"
-    extent = np.ptp(shape, axis=0)
-    if float(extent[0] * extent[1]) / size.size**2 > MOST_ELEMENTS:
-        raise BadInput(
-            Fault(file, "mesh.size", f"{mesh.size:g} m", f"a size that gives fewer than {MOST_ELEMENTS} elements")
-        )
     try:
         if mesh.method == "paved":
             return paved_mesh(shape, size)
         return mapped_mesh(shape, np.array(mesh.patches, dtype=np.int64), size)
     except Refused as error:
         raise BadInput(Fault(file, key, "", f"a domain that can be meshed ({error})")) from None
+
+
+def size_field(scene: FemScene) -> SizeField:
+    """Element sizes that the scene asks for, at its fidelity."""
+    mesh = scene.mesh
+    factor = {"draft": mesh.draft_factor, "standard": 1.0, "reference": mesh.reference_factor}[scene.fidelity]
+    return SizeField(
+        size=factor * mesh.size,
+        segments=np.array([[r.start, r.end] for r in mesh.refine], dtype=float).reshape(-1, 2, 2),
+        near_size=factor * np.array([r.size for r in mesh.refine], dtype=float),
+        growth=np.array([r.growth for r in mesh.refine], dtype=float),
+    )
 
 
 def read_quads(path: Path) -> QuadMesh:

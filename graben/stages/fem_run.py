@@ -16,13 +16,14 @@ from graben.mechanics.continuum.mesh2d import QuadMesh
 from graben.mechanics.continuum.newton import NewtonOptions, Step
 from graben.mechanics.continuum.quads import body_force, edge_traction
 from graben.mechanics.continuum.stability import softest_stiffness
-from graben.mechanics.materials.laws import LAWS
 from graben.schemas.files import refuse_existing
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.fem import FemScene
-from graben.schemas.scenes.material import read_material
+from graben.stages.estimate import Estimate, refuse_too_large
 from graben.stages.fem_mesh import mesh_of
 from graben.stages.fem_output import History, write_run
+from graben.stages.fem_sizes import sizes_of
+from graben.stages.material import pack_material
 from graben.stages.record import Progress, Record, silent
 
 # Gravity is a load history of its own, of unit length, in steps that are halved as the pressures' are.
@@ -81,12 +82,9 @@ def run(
     """
     scene: FemScene = load_scene(scene_path, "fem", overrides)
     refuse_existing(output, overwrite)
-    law, inputs = _material(scene, material)
-    if scene.mesh.method == "file" and scene.mesh.file is not None:
-        inputs = [*inputs, scene.mesh.file]
-    record = Record.begin(scene, inputs)
     progress(0.0, "meshing")
-    problem = _problem(scene, mesh_of(scene), law)
+    problem, inputs, _ = prepare(scene, material)
+    record = Record.begin(scene, inputs)
     body = problem.body
     progress(0.01, f"{len(body.mesh.quads)} elements; gravity")
     newton = NewtonOptions(scene.stepping.tolerance, scene.stepping.max_iterations)
@@ -121,18 +119,26 @@ def run(
     return headline
 
 
-def _material(scene: FemScene, replacement: Path | None) -> tuple[Material, list[Path]]:
-    """The law with packed parameters, and the files that it came from."""
-    source = replacement if replacement is not None else scene.material.file
-    name, values = read_material(replacement) if replacement is not None else scene.material.resolve()
-    law = LAWS[name]
-    faults = law.faults(values)
-    if faults:
-        file, prefix = (str(scene.source.path), "material.") if source is None else (str(source), "")
-        shown = [Fault(file, f"{prefix}parameters.{n}", str(values.get(n, "(absent)")), e) for n, e in faults]
-        raise BadInput(shown)
-    parameters = law.pack(values)
-    return Material(law.id, parameters, law.initial_state(parameters)), [] if source is None else [source]
+def prepare(scene: FemScene, material: Path | None = None) -> tuple[Problem, list[Path], list[Estimate]]:
+    """Mesh, law and loads of a scene, the files that they came from, and sizes, after every check that the run makes.
+
+    Raises
+    ------
+    BadInput : the scene, the mesh or the material has faults, or the run would be too large
+    """
+    file = scene.source.path
+    sizes = sizes_of(scene)
+    refuse_too_large(file, sizes)
+    source = material if material is not None else scene.material.file
+    law, parameters, _ = pack_material(material if material is not None else scene.material, file)
+    inputs = [] if source is None else [source]
+    if scene.mesh.method == "file" and scene.mesh.file is not None:
+        inputs.append(scene.mesh.file)
+    mesh = mesh_of(scene)
+    if scene.mesh.method == "file":
+        sizes = sizes_of(scene, len(mesh.quads))
+        refuse_too_large(file, sizes)
+    return _problem(scene, mesh, Material(law.id, parameters, law.initial_state(parameters))), inputs, sizes
 
 
 def _problem(scene: FemScene, mesh: QuadMesh, law: Material) -> Problem:
@@ -165,7 +171,10 @@ def _problem(scene: FemScene, mesh: QuadMesh, law: Material) -> Problem:
             unit, length, rate, offset = force, covered, load.rate, load.pressure
     if faults:
         raise BadInput(faults)
-    body = make_body(mesh, [law], fixed.ravel(), least_length=scene.softening_width)
+    try:
+        body = make_body(mesh, [law], fixed.ravel(), least_length=scene.softening_width)
+    except Refused as error:
+        raise BadInput(Fault(file, "supports", "", f"supports that leave something free ({error})")) from None
     return Problem(body, support_nodes, steady, rising, unit, length, rate, offset)
 
 

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from graben.errors import BadInput, Fault, NumericsFailed, Refused
-from graben.mechanics.particles.bed import HISTORY, Bed, BedFailed, BedRecipe, Snapshot, make_bed
-from graben.mechanics.particles.law import LinearLaw
+from graben.mechanics.particles.bed import (
+    HISTORY,
+    NOMINAL_FRACTION,
+    Bed,
+    BedFailed,
+    BedRecipe,
+    Snapshot,
+    check_recipe,
+    column_height,
+    make_bed,
+)
+from graben.mechanics.particles.law import LinearLaw, critical_step
 from graben.mechanics.particles.sampling import interval_over_areas, interval_over_beds
 from graben.schemas.artifact import write_artifact
 from graben.schemas.layouts.particles import LAYOUT
 from graben.schemas.scenes.particles import ParticlesScene
 from graben.schemas.vtk import VtuSeries, write_vtu
+from graben.stages.estimate import Estimate, refuse_too_large, work
 from graben.stages.record import Progress, Record, silent
 
 # (time step over critical, kinetic energy at rest, unbalanced force ratio): docs/dem-run-particles.md has the trade
 FIDELITY = {"draft": (0.6, 1e-2, 5e-3), "standard": (0.4, 1e-3, 1e-3), "reference": (0.2, 1e-4, 1e-4)}
+
+_GRAIN_BYTES = 4000.0  # states, contacts and their histories
 
 
 def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> dict[str, Any]:
@@ -34,12 +48,10 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
     BadInput : the mechanics refuse the scene
     NumericsFailed : a bed blew up or did not come to rest; NAME.last-good.vtu is beside the output
     """
+    law, recipe, _ = prepare(scene)
     record = Record.begin(scene)
     try:
-        law, recipe = _law(scene), _recipe(scene)
         beds = [make_bed(law, recipe, scene.seed + b, _part(progress, b, scene.beds)) for b in range(scene.beds)]
-    except Refused as error:
-        raise BadInput(Fault(str(scene.source.path), "", "", f"a scene that can be run ({error})")) from error
     except BedFailed as failure:
         kept = _write_last_good(output, failure.last_good)
         raise NumericsFailed(
@@ -79,6 +91,47 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
         "energy_error": record.cost["energy_error"],
         "unbalanced_force_ratio": record.cost["unbalanced_force_ratio"],
     }
+
+
+def prepare(scene: ParticlesScene) -> tuple[LinearLaw, BedRecipe, list[Estimate]]:
+    """Contact law, recipe and sizes of a scene, after every check that the run makes; no grain has been placed.
+
+    Raises
+    ------
+    BadInput : the scene is too large, or the mechanics refuse it
+    """
+    file = scene.source.path
+    try:
+        law, recipe = _law(scene), _recipe(scene)
+        sizes = _sizes(scene, law, recipe)
+        refuse_too_large(file, sizes)
+        check_recipe(law, recipe)
+    except Refused as error:
+        raise BadInput(Fault(str(file), "", "", f"a scene that can be run ({error})")) from error
+    return law, recipe, sizes
+
+
+def _sizes(scene: ParticlesScene, law: LinearLaw, recipe: BedRecipe) -> list[Estimate]:
+    """Grains, cells of the column that they are poured into, and the steps of their fall and of shaking at least."""
+    smallest = min(scene.grains, key=lambda g: g.diameter)
+    key, value = "grains.diameter", f"{smallest.diameter:g} m"
+    solid = NOMINAL_FRACTION * scene.box.width**2 * scene.box.depth
+    with np.errstate(all="ignore"):
+        grains = float((recipe.share * solid / (4.0 / 3.0 * np.pi * law.radius**3)).sum())
+    height = column_height(law, recipe, solid)
+    side = scene.box.width / (2.0 * float(law.radius.max()))
+    cells = side * side * (height / (2.0 * float(law.radius.max())))
+    seconds = math.sqrt(2.0 * height / recipe.gravity)
+    if recipe.shakes:
+        seconds += recipe.shakes / recipe.shake_frequency
+    steps = seconds / (recipe.safety * critical_step(law))
+    return [
+        Estimate("grains", grains * scene.beds, grains * scene.beds * _GRAIN_BYTES, key, value),
+        Estimate(
+            "cells of the poured column", cells, 8.0 * cells, "numerics.loose_fraction", f"{recipe.loose_fraction:g}"
+        ),
+        work("grain-steps", grains * scene.beds, steps, key, value),
+    ]
 
 
 def _part(progress: Progress, bed: int, beds: int) -> Progress:

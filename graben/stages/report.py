@@ -65,11 +65,12 @@ def _section(artifact: Path, png: bytes) -> str:
         **{f"input {Path(name).name}": f"SHA-256 {digest[:16]}..." for name, digest in inputs.items()},
         **{key: f"{value:.6g}" if isinstance(value, float) else value for key, value in cost.items()},
     }
+    doubts = "".join(f"<p>Warning: {html.escape(t)}</p>" for t in attributes.get("warnings", "").splitlines())
     rows = "".join(f"<tr><td>{html.escape(k)}</td><td>{html.escape(str(v))}</td></tr>" for k, v in facts.items())
     scene = attributes["scene"]
     text = f"<details><summary>scene</summary><pre>{html.escape(scene)}</pre></details>" if scene else ""
     image = base64.b64encode(png).decode()
     return (
-        f"<h2>{html.escape(artifact.stem)}</h2><p>{html.escape(attributes['title'])}</p>"
+        f"<h2>{html.escape(artifact.stem)}</h2><p>{html.escape(attributes['title'])}</p>{doubts}"
         f'<img alt="{html.escape(artifact.stem)}" src="data:image/png;base64,{image}"><table>{rows}</table>{text}'
     )

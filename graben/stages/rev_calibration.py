@@ -129,10 +129,7 @@ def fit_samples(
 
     progress(0.0, "the first fit, at the largest radius")
     first = task(radii - 1, middle, groups[0], _FIRST[scene.fidelity], None)
-    try:
-        fit, found = first.solve()
-    except Refused as error:
-        raise BadInput(Fault(str(law.source.path), "", "", f"a law that can be fitted ({error})")) from error
+    fit, found = first.solve()
     best = found.best
     known = identify(
         best.x, best.residuals, jacobian(lambda u: fit.residuals(box.to_values(u)), best.x, 1e-4),
@@ -162,6 +159,19 @@ def _curve(stress: np.ndarray, strain: np.ndarray, name: str) -> Curve:
     return Curve(name, stress[valid].copy(), strain)
 
 
+def check_law(scene: RevStudyScene, law: CalibrateScene) -> None:
+    """Raise BadInput where the law cannot be fitted, or a name that must settle is not free."""
+    free = _box(law).names
+    assert scene.calibration is not None
+    faults = [
+        Fault(str(scene.source.path), "calibration.properties", n, f"a free parameter: {', '.join(free)}")
+        for n in scene.calibration.properties
+        if n not in free
+    ]
+    if faults:
+        raise BadInput(faults)
+
+
 def _box(scene: CalibrateScene) -> Box:
     """Bounds of the free parameters, held against the ranges of the law."""
     names, lower, upper, log, _ = scene.bounds_si()
@@ -176,6 +186,10 @@ def _box(scene: CalibrateScene) -> Box:
             faults.append(Fault(path, f"free.{name}", f"{low:g} to {high:g}", f"{p.lower:g} to {p.upper:g} {p.unit}"))
     if faults:
         raise BadInput(faults)
+    try:
+        CurveFit.stand_in(scene.law, scene.fixed_si(), names)
+    except Refused as error:
+        raise BadInput(Fault(path, "", "", f"a law that can be fitted ({error})")) from error
     return Box.of(names, lower, upper, log)
 
 
@@ -184,19 +198,11 @@ def chosen_parameters(scene: RevStudyScene, fits: Fits) -> Sequence[str]:
 
     Raises
     ------
-    BadInput : a name that is not free; or none asked for and none identifiable
+    BadInput : none asked for and none identifiable
     """
     assert scene.calibration is not None
-    asked = scene.calibration.properties
     file, free = str(scene.source.path), ", ".join(fits.names)
-    faults = [
-        Fault(file, "calibration.properties", name, f"a free parameter of the calibration: {free}")
-        for name in asked
-        if name not in fits.names
-    ]
-    if faults:
-        raise BadInput(faults)
-    names = asked or [n for n, told in zip(fits.names, fits.identifiable) if told]
+    names = scene.calibration.properties or [n for n, told in zip(fits.names, fits.identifiable) if told]
     if not names:
         raise BadInput(
             Fault(

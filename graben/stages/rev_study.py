@@ -24,17 +24,44 @@ from graben.schemas.artifact import write_artifact
 from graben.schemas.files import refuse_existing
 from graben.schemas.layouts.rev_study import LAYOUT
 from graben.schemas.scene import load_scene
+from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.rev_study import RevStudyScene
 from graben.stages.block_history import Run, read_run
+from graben.stages.estimate import Estimate, refuse_too_large
 from graben.stages.record import Progress, Record, silent
-from graben.stages.rev_calibration import Fits, chosen_parameters, fit_samples
+from graben.stages.rev_calibration import Fits, check_law, chosen_parameters, fit_samples
 from graben.stages.workers import compute
 
+_SAMPLE_BYTES = 20_000.0  # curves of a hundred states
 RESAMPLES = {"draft": 500, "standard": 2000, "reference": 20_000}
 
 # One chunk of samples: the file, and its (radius, x, y); one result each: stress, strain, area, blocks.
 Chunk = tuple[Path, list[tuple[float, float, float]]]
 Sample = tuple[np.ndarray, np.ndarray, float, int]
+
+
+def prepare(scene: RevStudyScene, runs: int = 1) -> tuple[CalibrateScene | None, list[Estimate]]:
+    """The calibration of a study, if there is one, and sizes, after every check that needs no run.
+
+    Raises
+    ------
+    BadInput : the scene or its calibration has faults, or the study would be too large
+    """
+    law: CalibrateScene | None = None
+    if scene.calibration is not None:
+        law = load_scene(scene.calibration.scene, "calibrate")
+        check_law(scene, law)
+    places = float(len(scene.samples.centres) or scene.samples.grid**2)
+    samples = places * len(scene.samples.radii) * runs
+    draws = scene.tests.resamples or RESAMPLES[scene.fidelity]
+    columns = runs if runs >= 3 else places * runs
+    drawn = 16.0 * draws * columns * len(scene.samples.radii)
+    sizes = [
+        Estimate("samples", samples, samples * _SAMPLE_BYTES, "samples.grid", str(scene.samples.grid)),
+        Estimate("draws of the bootstrap", draws, drawn, "tests.resamples", str(draws)),
+    ]
+    refuse_too_large(scene.source.path, sizes)
+    return law, sizes
 
 
 def run(
@@ -65,7 +92,7 @@ def run(
     BadInput : faults of the inputs, a REV outside a model, runs at different lateral stress, an output that exists
     """
     refuse_existing(output, overwrite)
-    law = load_scene(scene.calibration.scene, "calibrate") if scene.calibration is not None else None
+    law, _ = prepare(scene, len(inputs))
     runs = _read(inputs, scene, progress)
     groups = _realizations(runs)
     record = Record.begin(scene, inputs=[*inputs, *([law.source.path] if law else [])])

@@ -11,12 +11,13 @@ import numpy as np
 
 from graben.errors import BadInput, Fault, NumericsFailed
 from graben.mechanics.continuum.scratch import run as mechanics
-from graben.mechanics.continuum.scratch.mesh import HexMesh, specimen
+from graben.mechanics.continuum.scratch.mesh import HexMesh, cells_along, specimen
 from graben.mechanics.materials.law import Law
 from graben.mechanics.materials.laws import LAWS
 from graben.schemas.files import refuse_existing
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.scratch import ScratchScene
+from graben.stages.estimate import Estimate, refuse_too_large, work
 from graben.stages.material import pack_material
 from graben.stages.record import Progress, Record, silent
 from graben.stages.scratch_output import measure_groove, write_last_good, write_run
@@ -24,6 +25,8 @@ from graben.stages.scratch_output import measure_groove, write_last_good, write_
 _log = logging.getLogger(__name__)
 # Laws whose strain increments may add up to plastic strains of order 1 under the tip.
 _TAKES = ("elastic", "j2", "erve", "drucker-prager")
+_BRICK_BYTES = 2000.0
+_STATE_BYTES = 400.0
 
 
 def run(
@@ -54,10 +57,8 @@ def run(
     """
     scene: ScratchScene = load_scene(scene_path, "scratch", overrides)
     refuse_existing(output, overwrite)
-    source = material if material is not None else scene.material.file
-    law, par, _ = pack_material(material if material is not None else scene.material, scene_path)
-    _check_law(scene, law, str(source or scene_path))
-    record = Record.begin(scene, [] if source is None else [source])
+    law, par, inputs, _ = prepare(scene, material)
+    record = Record.begin(scene, inputs)
     mesh = mesh_of(scene)
     progress(0.0, f"{len(mesh.cells)} elements")
     try:
@@ -94,6 +95,46 @@ def run(
     write_run(output, record, scene, mesh, result, groove)
     progress(1.0, "done")
     return headline
+
+
+def prepare(scene: ScratchScene, material: Path | None = None) -> tuple[Law, np.ndarray, list[Path], list[Estimate]]:
+    """Law, packed parameters, the files that they came from, and sizes, after every check that the run makes.
+
+    Raises
+    ------
+    BadInput : the material has faults, or the run would be too large
+    """
+    file = scene.source.path
+    source = material if material is not None else scene.material.file
+    law, par, _ = pack_material(material if material is not None else scene.material, file)
+    _check_law(scene, law, str(source or file))
+    sizes = _sizes(scene)
+    refuse_too_large(file, sizes)
+    return law, par, [] if source is None else [source], sizes
+
+
+def _sizes(scene: ScratchScene) -> list[Estimate]:
+    """Bricks, saved states, and steps by the speeds of the tip and the time that a wave takes across a brick."""
+    s, t, n, size = scene.specimen, scene.tip, numerics_of(scene), mesh_size(scene)
+    reach = 1.6 * scene.contact_half_width
+    fine = min(2.0 * reach + t.path, s.length)
+    bricks = (
+        cells_along(s.length - fine, fine, size, scene.mesh.growth)
+        * cells_along(max(0.0, 0.5 * s.width - reach), min(reach, 0.5 * s.width), size, scene.mesh.growth)
+        * cells_along(s.thickness, min(2.0 * size, s.thickness), size, scene.mesh.growth_depth)
+    )
+    steps = (
+        1.5 * (t.depth / n.indent_speed + t.path / n.slide_speed + 1.1 * t.depth / n.lift_speed) / (n.safety * size)
+    )
+    states = 3.0 + scene.output.frames
+    sections = float(scene.output.sections * scene.output.points)
+    key, value = "mesh.size", f"{scene.mesh.size:g} m"
+    return [
+        Estimate("bricks", bricks, bricks * _BRICK_BYTES, key, value),
+        Estimate("saved states", states, states * bricks * _STATE_BYTES, "output.frames", str(scene.output.frames)),
+        Estimate("points of sections", sections, 200.0 * sections, "output.points", str(scene.output.points)),
+        work("brick-steps", bricks, steps, key, value),
+    ]
 
 
 def mesh_size(scene: ScratchScene) -> float:

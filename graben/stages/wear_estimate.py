@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault, Refused
+from graben.errors import BadInput, Fault, Incomplete, Refused
 from graben.mechanics.wear.counts import contacts_per_area, doubts
 from graben.mechanics.wear.rate import GrooveTable, balanced_forces, carried_load, wear_rates
 from graben.schemas.artifact import read_artifact, write_artifact
@@ -22,8 +21,6 @@ from graben.stages.record import Progress, Record, silent
 
 # carried over applied load may differ by this much before a warning
 LOAD_TOLERANCE = 0.1
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -69,33 +66,10 @@ def run(
     """
     scene: WearScene = load_scene(scene_path, "wear", overrides)
     refuse_existing(output, overwrite)
-    bed_file = bed or (scene.counts.bed if scene.counts.source == "bed" else None)
-    files = {g.name: list(g.scratch) for g in scene.grains}
-    faults: list[Fault] = []
-    for name, paths in (scratch or {}).items():
-        if name not in files:
-            faults.append(Fault("--scratch", name, "", f"a class of the scene: {', '.join(files)}"))
-        else:
-            files[name] += list(paths)
-    if bed_file is None and scene.counts.source == "bed":
-        faults.append(Fault(str(scene_path), "counts.bed", "(absent)", "a particles artifact, or --bed FILE"))
-    if bed_file is None and scene.load.split == "bed":
-        faults.append(Fault(str(scene_path), "load.split", "'bed'", "a bed to take it from (--bed FILE)"))
-    counted = _read_bed(scene, bed_file, faults) if bed_file is not None else None
-    known = {g.name: _grooves(scene, g.name, files[g.name], faults) for g in scene.grains}
-    _check_grooves(scene, known, faults)
-    if faults:
-        raise BadInput(faults)
-
-    inputs = [p for paths in files.values() for p in paths] + ([bed_file] if bed_file is not None else [])
-    record = Record.begin(scene, inputs)
-    warnings: list[str] = []
-    rows = []
-    for number, mixture in enumerate(scene.mixtures):
-        progress(number / len(scene.mixtures), mixture.name)
-        rows.append(_rate(scene, mixture, counted, known, warnings))
-    for text in warnings:
-        _log.warning(text)
+    prepared = prepare(scene, bed, scratch)
+    record = Record.begin(scene, prepared.inputs)
+    rows = prepared.rows
+    record.warnings = prepared.warnings
 
     arrays = {
         "mixture_name": np.array([m.name for m in scene.mixtures]),
@@ -107,8 +81,7 @@ def run(
         "contact_area": scene.machine.contact_area,
     }
     record.cost["mixtures"] = len(rows)
-    attributes = {"warnings": "\n".join(warnings), "load_mode": scene.load.mode}
-    write_artifact(output, LAYOUT, arrays, record, attributes)
+    write_artifact(output, LAYOUT, arrays, record, {"load_mode": scene.load.mode})
     names = [g.name for g in scene.grains]
     return {
         "mixtures": [
@@ -120,8 +93,54 @@ def run(
             }
             for mixture, row in zip(scene.mixtures, rows)
         ],
-        "warnings": warnings,
+        "warnings": record.warnings,
     }
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A rated scene, of which nothing is written: files read, a row for each mixture, warnings."""
+
+    inputs: list[Path]
+    rows: list[dict[str, Any]]
+    warnings: list[str]
+
+
+def prepare(
+    scene: WearScene, bed: Path | None = None, scratch: Mapping[str, Iterable[Path]] | None = None
+) -> Prepared:
+    """Rate every mixture; the work is no more than the checks. Parameters as in `run`.
+
+    Raises
+    ------
+    BadInput : every fault of scene and artifacts at once
+    Incomplete : no other fault than that the command line must name a bed or scratches
+    """
+    file = str(scene.source.path)
+    bed_file = bed or (scene.counts.bed if scene.counts.source == "bed" else None)
+    files = {g.name: list(g.scratch) for g in scene.grains}
+    faults: list[Fault] = []
+    for name, paths in (scratch or {}).items():
+        if name not in files:
+            faults.append(Fault("--scratch", name, "", f"a class of the scene: {', '.join(files)}"))
+        else:
+            files[name] += list(paths)
+    counted = _read_bed(scene, bed_file, faults) if bed_file is not None else None
+    known = {g.name: _grooves(scene, g.name, files[g.name], faults) for g in scene.grains}
+    absent: list[Fault] = []
+    if bed_file is None and scene.counts.source == "bed":
+        absent.append(Fault(file, "counts.bed", "(absent)", "a particles artifact, or --bed FILE"))
+    if bed_file is None and scene.load.split == "bed":
+        absent.append(Fault(file, "load.split", "'bed'", "a bed to take it from (--bed FILE)"))
+    _check_grooves(scene, known, faults, absent)
+    if faults:
+        raise BadInput(faults + absent)
+    if absent:
+        raise Incomplete(absent)
+    warnings: list[str] = []
+    rows = [_rate(scene, mixture, counted, known, warnings) for mixture in scene.mixtures]
+    inputs = [p for paths in files.values() for p in paths] + ([bed_file] if bed_file is not None else [])
+    return Prepared(inputs, rows, warnings)
 
 
 def _speed(scene: WearScene) -> float:
@@ -194,13 +213,15 @@ def _grooves(scene: WearScene, name: str, files: list[Path], faults: list[Fault]
     return known
 
 
-def _check_grooves(scene: WearScene, known: dict[str, list[_Known]], faults: list[Fault]) -> None:
+def _check_grooves(
+    scene: WearScene, known: dict[str, list[_Known]], faults: list[Fault], absent: list[Fault]
+) -> None:
     used = [g.name for g in scene.grains if any(m.shares.get(g.name, 0.0) > 0.0 for m in scene.mixtures)]
     file = str(scene.source.path)
     for name in used:
         found = len(known[name])
         if scene.load.mode == "given" and found != 1:
-            faults.append(
+            (faults if found else absent).append(
                 Fault(
                     file,
                     f"grains {name!r} grooves",
@@ -209,7 +230,7 @@ def _check_grooves(scene: WearScene, known: dict[str, list[_Known]], faults: lis
                 )
             )
     if scene.load.mode == "balanced" and not any(known[name] for name in used):
-        faults.append(Fault(file, "grains grooves", "none", "one groove at least, or --scratch NAME=FILE"))
+        absent.append(Fault(file, "grains grooves", "none", "one groove at least, or --scratch NAME=FILE"))
 
 
 def _table(scene: WearScene, name: str, known: dict[str, list[_Known]]) -> GrooveTable:

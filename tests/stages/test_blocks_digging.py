@@ -110,7 +110,11 @@ def test_what_reads_it_leaves_out_what_is_gone(scene, dug):
 @pytest.mark.parametrize(
     ("setting", "key", "word"),
     [
-        ('programme.excavations=[{polygon=[["9 m","9 m"],["10 m","9 m"],["9 m","10 m"]]}]', "", "no block"),
+        (
+            'programme.excavations=[{polygon=[["9 m","9 m"],["10 m","9 m"],["9 m","10 m"]]}]',
+            "programme.excavations.0",
+            "middle of a block",
+        ),
         ('programme.excavations=[{polygon=[["9 m","9 m"],["10 m","9 m"]]}]', "polygon", "3"),
         (
             'programme.excavations=[{polygon=[["1 m","1 m"],["2 m","1 m"],["1 m","2 m"]],time="-1 s"}]',

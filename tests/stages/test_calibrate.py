@@ -10,8 +10,8 @@ from click.testing import CliRunner
 
 from graben.cli.calibrate import main
 from graben.errors import BadInput
-from graben.schemas.check import check
 from graben.stages import calibrate
+from graben.stages.check import check
 from graben.stages.material import pack_material
 
 ROOT = Path(__file__).parents[2]

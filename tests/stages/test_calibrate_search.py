@@ -8,8 +8,8 @@ import pytest
 import xarray
 
 from graben.errors import BadInput
-from graben.schemas.check import check
 from graben.stages import calibrate
+from graben.stages.check import check
 from tests.conftest import PIPELINES
 
 SCENE = PIPELINES / "upscaling/calibrate-udec.toml"

@@ -217,7 +217,7 @@ def test_failing_under_gravity_is_exit_3_and_keeps_the_last_state(tmp_path):
         (("[1, 2, 5, 4]]", "[1, 2, 5, 9]]"), ["mesh.patches", "corners 0 to 5"]),
         (("[1, 2, 5, 4]]", "[1, 5, 2, 4]]"), ["mesh.patches", "patch 1 is not a convex"]),
         (('size = "0.5 m"', 'size = "-0.5 m"'), ["mesh.size", "greater than 0"]),
-        (('size = "0.5 m"', 'size = "0.1 mm"'), ["mesh.size", "fewer than"]),
+        (('size = "0.5 m"', 'size = "0.1 mm"'), ["mesh.size", "at most"]),
         (("poisson_ratio = 0.3", "poisson_ratio = 0.6"), ["material.parameters.poisson_ratio"]),
         (("poisson_ratio = 0.3\n", ""), ["material.parameters.poisson_ratio", "required"]),
         (('law = "drucker-prager"', 'law = "granite"'), ["material"]),

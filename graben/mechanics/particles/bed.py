@@ -107,6 +107,23 @@ def numbers(law: LinearLaw, recipe: BedRecipe) -> Ints:
     return count
 
 
+def check_recipe(law: LinearLaw, recipe: BedRecipe) -> None:
+    """Raise Refused for a bed that cannot be made; nothing is placed."""
+    if not recipe.pressure > 0.0 or not recipe.gravity > 0.0:
+        raise Refused(f"expected pressure > 0 and gravity > 0, found {recipe.pressure}, {recipe.gravity}")
+    if recipe.shakes > 0 and not (recipe.shake_amplitude > 0.0 and recipe.shake_frequency > 0.0):
+        raise Refused("shaking: expected amplitude > 0 and frequency > 0")
+    numbers(law, recipe)
+    largest = 2.0 * float(law.radius.max())
+    if not recipe.periodic and min(recipe.width) <= largest:
+        raise Refused(f"box.width: expected more than one grain, {largest:.6g} m, found {min(recipe.width):.6g} m")
+
+
+def column_height(law: LinearLaw, recipe: BedRecipe, solid: float) -> float:
+    """Height of the column that is poured, m, from the volume of its grains, m3."""
+    return max(solid / (recipe.loose_fraction * recipe.width[0] * recipe.width[1]), 4.0 * float(law.radius.max()))
+
+
 @dataclass(frozen=True)
 class Snapshot:
     """Where all grains were, in the order of insertion: time s, position and velocity (n, 3), radius, kind (n,)."""
@@ -136,7 +153,7 @@ class _Run:
         kind = np.repeat(order, count[order])
         volume = float(np.sum(count * 4.0 / 3.0 * np.pi * law.radius**3))
         area = recipe.width[0] * recipe.width[1]
-        height = max(volume / (recipe.loose_fraction * area), 4.0 * float(law.radius.max()))
+        height = column_height(law, recipe, volume)
         rng = np.random.Generator(np.random.PCG64(seed))
         position = insert(law.radius[kind], recipe.width, height, rng, periodic=recipe.periodic)
         self.box = Assembly(
@@ -216,13 +233,10 @@ def make_bed(
 ) -> Bed:
     """Pour, settle, shake (if asked), press and quench one bed.
 
-    Returns the bed at rest; raises ValueError for an impossible recipe and NumericsFailed when the run blows up,
-    loses energy balance, or does not come to rest within recipe.max_steps (as BedFailed, with the last good state).
+    Returns the bed at rest; raises Refused for an impossible recipe and NumericsFailed when the run blows up, loses
+    energy balance, or does not come to rest within recipe.max_steps (as BedFailed, with the last good state).
     """
-    if not recipe.pressure > 0.0 or not recipe.gravity > 0.0:
-        raise Refused(f"expected pressure > 0 and gravity > 0, found {recipe.pressure}, {recipe.gravity}")
-    if recipe.shakes > 0 and not (recipe.shake_amplitude > 0.0 and recipe.shake_frequency > 0.0):
-        raise Refused("shaking: expected amplitude > 0 and frequency > 0")
+    check_recipe(law, recipe)
     run = _Run(law, recipe, seed, progress)
     try:
         return _finish(run, law, recipe)

@@ -11,12 +11,17 @@ from numpy.typing import NDArray
 
 from graben.mechanics.search.appso import appso
 from graben.mechanics.search.dds import dds
-from graben.mechanics.search.evolution import cma_es, differential_evolution
+from graben.mechanics.search.evolution import FEWEST, cma_es, differential_evolution
 from graben.mechanics.search.swarm import SwarmResult, swarm
 
 Array = NDArray[np.float64]
 
 METHODS = ("swarm", "appso", "dds", "differential-evolution", "cma-es")
+
+
+def fewest(method: str) -> int:
+    """The smallest number of particles that a search takes."""
+    return FEWEST if method in ("differential-evolution", "cma-es") else 1
 
 
 class Budget(Protocol):

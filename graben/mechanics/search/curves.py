@@ -169,18 +169,24 @@ class CurveFit:
         record = find(self.law)
         if not self.curves:
             raise Refused("curves: expected at least one")
-        stand_in = dict(self.fixed)
-        for name in self.free:
-            parameter = record.parameter(name)
-            stand_in[name] = min(max(1.0, parameter.lower), parameter.upper)
-        record_faults = [f for f in record.faults(stand_in) if f[0] != ""]
-        if record_faults:
-            raise Refused("; ".join(f"{name}: expected {text}" for name, text in record_faults))
+        stand_in = self.stand_in(self.law, self.fixed, self.free)
         self._id = record.id
         self._base = _pack_unchecked(record, stand_in)
         self._slots = np.array([record.index(name) for name in self.free], dtype=np.int64)
         self._start = record.initial_state(self._base)
         self._arrange()
+
+    @staticmethod
+    def stand_in(law: str, fixed: Mapping[str, Any], free: Sequence[str]) -> dict[str, Any]:
+        """Named values with a number for every free parameter; Refused when the law does not take them."""
+        record, values = find(law), dict(fixed)
+        for name in free:
+            parameter = record.parameter(name)
+            values[name] = min(max(1.0, parameter.lower), parameter.upper)
+        faults = [f for f in record.faults(values) if f[0] != ""]
+        if faults:
+            raise Refused("; ".join(f"{name}: expected {text}" for name, text in faults))
+        return values
 
     def _arrange(self) -> None:
         count, steps, n = len(self.curves), max(len(c.stress) for c in self.curves), 4

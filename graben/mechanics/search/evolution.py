@@ -15,6 +15,7 @@ from graben.mechanics.search.swarm import SwarmResult, finite_values, stratified
 
 Array = NDArray[np.float64]
 Objective = Callable[[Array], Array]
+FEWEST = 5  # sets of a population
 
 
 def differential_evolution(
@@ -36,8 +37,8 @@ def differential_evolution(
     """
     from scipy import optimize
 
-    if size < 1 or particles < 5:
-        raise Refused(f"differential_evolution: expected size >= 1 and particles >= 5, found {size}, {particles}")
+    if size < 1 or particles < FEWEST:
+        raise Refused(f"differential_evolution: expected size >= 1, particles >= {FEWEST}, found {size}, {particles}")
     rng = np.random.Generator(np.random.PCG64(seed))
     population = stratified(rng, particles, size)
     if starts is not None and len(starts):
@@ -112,8 +113,8 @@ def cma_es(
         raise ModuleNotFoundError(
             "cma-es needs the package cmaes: pip install 'graben[search]'", name="cmaes"
         ) from error
-    if size < 1 or particles < 5:
-        raise Refused(f"cma_es: expected size >= 1 and particles >= 5, found {size}, {particles}")
+    if size < 1 or particles < FEWEST:
+        raise Refused(f"cma_es: expected size >= 1 and particles >= {FEWEST}, found {size}, {particles}")
     rng = np.random.Generator(np.random.PCG64(seed))
     # The package refuses a single parameter: a second one without effect stands beside it.
     sizes = max(size, 2)

@@ -5,6 +5,7 @@ Axes: x along the scratch, y across (y = 0 is the plane of symmetry), z up (z = 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,6 +55,12 @@ def graded_axis(start: float, stop: float, fine: tuple[float, float], size: floa
     lines = np.linspace(a, b, count + 1)
     step = (b - a) / count
     return np.concatenate([a - _growing(a - start, step, growth)[::-1], lines, b + _growing(stop - b, step, growth)])
+
+
+def cells_along(outside: float, fine: float, size: float, growth: float) -> float:
+    """About as many cells as an axis gets: a fine range, and cells that grow on the rest of it."""
+    rest = outside / size
+    return fine / size + (rest if growth <= 1.0 else min(rest, math.log1p(rest * (growth - 1.0)) / math.log(growth)))
 
 
 def _growing(length: float, first: float, growth: float) -> Floats:

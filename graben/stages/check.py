@@ -1,0 +1,82 @@
+"""What `graben check` finds: each stage's own checks before its work, and what readers of an artifact look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from graben.errors import BadInput, Fault, Incomplete
+from graben.schemas.artifact import check_artifact
+from graben.schemas.kinds import SCENES
+from graben.schemas.scene import load_scene
+
+# Kind of scene -> the stage whose prepare(scene) makes every check before its work.
+_STAGES = {
+    "blocks": "blocks",
+    "particles": "particles",
+    "rev-study": "rev_study",
+    "calibrate": "calibrate",
+    "fem": "fem_run",
+    "scratch": "scratch",
+    "wear": "wear_estimate",
+}
+
+
+def check(path: str | Path) -> list[Fault]:
+    """Every fault of a scene or material file (.toml) or an artifact (.nc); empty when there is none."""
+    return examine(path)[0]
+
+
+def examine(path: str | Path) -> tuple[list[Fault], list[Fault]]:
+    """Faults of a file, and what its stage needs beside it on the command line."""
+    path = Path(path)
+    try:
+        if path.suffix == ".nc":
+            return _artifact(path), []
+        if path.suffix != ".toml":
+            return [Fault(str(path), "", "", "a scene or material file (.toml) or an artifact (.nc)")], []
+        _toml(path)
+    except Incomplete as error:
+        return [], error.faults
+    except BadInput as error:
+        return error.faults, []
+    return [], []
+
+
+def _toml(path: Path) -> None:
+    if path.name.endswith(".material.toml"):
+        from graben.stages.material import pack_material
+
+        pack_material(path, path)
+        return
+    scene = load_scene(path, tuple(SCENES))
+    import_module(f"graben.stages.{_STAGES[scene.kind]}").prepare(scene)
+
+
+def _artifact(path: Path) -> list[Fault]:
+    """Faults by the layout; where there are none, those that readers of the kind find in what it means."""
+    faults = check_artifact(path)
+    if not faults:
+        from xarray import open_dataset
+
+        with open_dataset(path, engine="netcdf4", decode_times=False) as data:
+            kind = data.attrs["schema_kind"]
+        _READERS.get(kind, lambda path: None)(path)
+    return faults
+
+
+def _blocks(path: Path) -> None:
+    from graben.stages.block_history import read_run
+
+    read_run(path)
+
+
+def _material(path: Path) -> None:
+    from graben.stages.material import pack_material
+
+    pack_material(path, path)
+
+
+_READERS: dict[str, Callable[[Path], Any]] = {"blocks": _blocks, "calibration": _material}
