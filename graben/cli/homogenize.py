@@ -10,12 +10,12 @@ from graben.cli.options import FILE, Session, Tool, stage_options
 
 
 def _length(text: str, option: str) -> float:
-    from graben.errors import BadInput, Fault
+    from graben.errors import BadInput, Fault, Refused
     from graben.schemas.quantities import to_si
 
     try:
-        return to_si(text.strip(), "m")
-    except ValueError as error:
+        return to_si(text, "m")
+    except Refused as error:
         raise BadInput(Fault("homogenize", option, repr(text), str(error))) from error
 
 
@@ -42,7 +42,12 @@ def _centre(text: str) -> tuple[float, ...]:
 )
 @click.option("--polygon", metavar="X,Y;...", help='A polygon instead: "1 m,1 m; 9 m,1 m; 9 m,9 m".')
 @click.option("--deformed", is_flag=True, help="Measure area and strain in the outline's current shape.")
-@click.option("--chosen-at", type=int, default=0, help="Saved state at which blocks meet the REV (0: the first).")
+@click.option(
+    "--chosen-at",
+    type=click.IntRange(0, 10**9),
+    default=0,
+    help="Saved state at which blocks meet the REV (0: the first).",
+)
 @click.option("--steps", "steps_picture", type=FILE, help="Also draw how the outline was found (.png, .pdf, .svg).")
 @click.option("--vtk", is_flag=True, help="Also write the outlines as they move (NAME.pvd, for ParaView).")
 @stage_options

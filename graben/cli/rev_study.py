@@ -53,7 +53,7 @@ def main(
 
     short = list(overrides)
     if radii:
-        short.append("samples.radii=[" + ", ".join(f'"{r}"' for r in radii) + "]")
+        short.append(f"samples.radii={json.dumps(radii, ensure_ascii=False)}")
     if grid is not None:
         short.append(f"samples.grid={grid}")
     if calibrate is not None:

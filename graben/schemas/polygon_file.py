@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from graben.errors import BadInput, Fault
+from graben.schemas.reading import read_json
 
 GEOJSON = (".geojson", ".json")
 
@@ -30,6 +30,8 @@ def read_polygons(path: Path) -> Polygons:
         found = _geojson(path) if path.suffix.lower() in GEOJSON else _mesh(path)
     except BadInput:
         raise
+    except RecursionError:
+        raise BadInput(Fault(str(path), "geometries", "", "collections of geometries nested less deeply")) from None
     except (Exception, SystemExit) as error:  # meshio raises errors of many kinds, and exits on some
         raise BadInput(Fault(str(path), "", "", f"a file of polygons ({error})")) from error
     if not found[0]:
@@ -65,7 +67,7 @@ def _geojson(path: Path) -> Polygons:
                 found.append(ring)
                 sets.append(own)
 
-    visit(json.loads(path.read_text(encoding="utf-8")))
+    visit(read_json(path, "map in GeoJSON"))
     return found, sets
 
 

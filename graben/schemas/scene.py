@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import hashlib
-import tomllib
+import os
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,8 +13,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, PrivateAttr, ValidationError, ValidationInfo
 
-from graben.errors import BadInput, Fault
-from graben.schemas.quantities import key
+from graben.errors import BadInput, Fault, Refused
+from graben.schemas.quantities import Integer, key
+from graben.schemas.reading import parse_toml, read_toml
 
 Fidelity = Literal["draft", "standard", "reference"]
 
@@ -21,7 +23,13 @@ Fidelity = Literal["draft", "standard", "reference"]
 class Model(BaseModel):
     """A table of a scene: unknown keys are faults, values do not change, defaults are checked too."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_default=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        validate_default=True,
+        arbitrary_types_allowed=True,
+        allow_inf_nan=False,
+    )
 
 
 @dataclass(frozen=True)
@@ -46,7 +54,9 @@ class Scene(Model):
     """The keys that every scene has. Each kind derives from this and declares ``kind: Literal["..."]``."""
 
     title: str = key("", "one line that says what this scene is")
-    seed: int = key(0, "seed of everything random: the same scene and seed give bitwise the same arrays", ge=0)
+    seed: Integer = key(
+        0, "seed of everything random: the same scene and seed give bitwise the same arrays", ge=0, lt=2**32
+    )
     fidelity: Fidelity = key("standard", "a measured point between speed and accuracy: draft, standard or reference")
     _source: Source | None = PrivateAttr(default=None)
 
@@ -60,8 +70,8 @@ class Scene(Model):
 def _existing_file(path: Path, info: ValidationInfo) -> Path:
     folder = (info.context or {}).get("folder", Path())
     resolved = path if path.is_absolute() else folder / path
-    if (info.context or {}).get("check_files", True) and not resolved.is_file():
-        raise ValueError(f"an existing file (looked for {resolved})")
+    if (info.context or {}).get("check_files", True) and not os.path.isfile(resolved):
+        raise Refused(f"an existing file (looked for {resolved})")
     return resolved
 
 
@@ -90,13 +100,13 @@ def load_scene(path: str | Path, kind: str | Iterable[str], overrides: Iterable[
 
     path = Path(path)
     kinds = [kind] if isinstance(kind, str) else list(kind)
-    text, tables = _parse(path)
+    text, tables = read_toml(path, "scene file")
     overrides = tuple(overrides)
     for setting in overrides:
         _override(tables, setting)
     found = tables.get("kind")
     if not isinstance(found, str) or found not in SCENES or found not in kinds:
-        shown = "(absent)" if found is None else repr(found)
+        shown = "(absent)" if found is None else _shown(found)
         raise BadInput(Fault(str(path), "kind", shown, " or ".join(map(repr, kinds))))
     model = scene_model(found)
     try:
@@ -107,33 +117,25 @@ def load_scene(path: str | Path, kind: str | Iterable[str], overrides: Iterable[
     return scene
 
 
-def _parse(path: Path) -> tuple[str, dict[str, Any]]:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise BadInput(Fault(str(path), "", "", "an existing scene file")) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(Fault(str(path), "", "", f"a readable TOML file in UTF-8 ({error})")) from None
-    try:
-        return text, tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise BadInput(Fault(str(path), "", "", f"valid TOML ({error})")) from None
+_NO_SETTING = re.compile("[\\x00-\\x08\\x0a-\\x1f\\x7f\\ud800-\\udfff]")
+"""Line breaks, other control characters and bytes that are no UTF-8."""
 
 
 def _override(tables: dict[str, Any], setting: str) -> None:
     name, equals, raw = setting.partition("=")
     parts = name.strip().split(".")
-    if not equals or not all(parts):
-        raise BadInput(Fault("--set", setting, "", "KEY=VALUE with a dotted key, such as seed=3"))
+    if not equals or not all(parts) or len(parts) > 16 or _NO_SETTING.search(setting):
+        expected = "KEY=VALUE with a dotted key, such as seed=3, in one line of text"
+        raise BadInput(Fault("--set", _shown(setting), "", expected))
     try:
-        value = tomllib.loads(f"v = {raw}")["v"]
-    except tomllib.TOMLDecodeError:
+        value = parse_toml(f"v = {raw}")["v"]
+    except ValueError:
         value = raw.strip()  # an unquoted string, as shells like to leave it
     table = tables
     for part in parts[:-1]:
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
-            raise BadInput(Fault("--set", name, repr(raw), f"a table at {part}"))
+            raise BadInput(Fault("--set", name, _shown(raw), f"a table at {part}"))
     table[parts[-1]] = copy.deepcopy(value)
 
 
@@ -145,9 +147,18 @@ def _faults(file: str, error: ValidationError) -> list[Fault]:
         if e["type"] == "missing":
             found, expected = "(absent)", "a value"
         elif e["type"] == "extra_forbidden":
-            found, expected = repr(value), "no such key (see `graben scene KIND` for those that exist)"
+            found, expected = _shown(value), "no such key (see `graben scene KIND` for those that exist)"
         else:
-            found = repr(value) if not isinstance(value, dict | BaseModel) else ""
+            found = _shown(value) if not isinstance(value, dict | BaseModel) else ""
             expected = e["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-        faults.append(Fault(file, where, found if len(found) < 200 else found[:200] + "...", expected))
+        faults.append(Fault(file, where if len(where) < 200 else where[:200] + "...", found, expected))
     return faults
+
+
+def _shown(value: Any) -> str:
+    """A value for a message, cut where it is long."""
+    try:
+        text = repr(value)
+    except ValueError:  # an integer of thousands of digits
+        return "a huge integer"
+    return text if len(text) < 200 else text[:200] + "..."

@@ -13,6 +13,7 @@ import numpy as np
 from graben.errors import BadInput, Fault
 from graben.mechanics.search.curves import Curve
 from graben.schemas.artifact import read_artifact
+from graben.schemas.reading import read_text
 
 _STRESS_UNITS = {"pa": 1.0, "kpa": 1e3, "mpa": 1e6, "gpa": 1e9}
 _AXES = ("xx", "yy", "zz", "xy")
@@ -129,10 +130,7 @@ def _title(name: str, lateral: float) -> str:
 
 
 def _csv(path: Path, reading: Reading) -> list[Curve]:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise BadInput(Fault(str(path), "", "", f"a readable CSV file ({error})")) from None
+    text = read_text(path, "CSV file")
     lines = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
     if not lines:
         raise BadInput(Fault(str(path), "", "empty", "a header and rows"))

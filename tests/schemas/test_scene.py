@@ -100,3 +100,32 @@ def test_overrides_replace_keys_and_are_noted_in_the_text(scene_file):
         load_scene(path, "blocks", ["seed"])
     with pytest.raises(BadInput, match="no such key"):
         load_scene(path, "blocks", ["sede=7"])
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("machine.applied_load=1,5 kN", "write 1.5 kN"),
+        ('machine.applied_load="1 500 N"', "thousands"),
+        ("machine.applied_load=1500", "bare number"),
+        ("machine.rotation=50 Hz", "names its angle"),
+        ("seed=1,5", "integer"),
+        ("seed=3\nfidelity='draft'", "one line"),
+        ("title=a\udcff", "one line"),
+        ("seed=" + "[" * 5000, "integer"),
+        ("seed=" + "9" * 5000, "integer"),
+        ("seed=0x" + "f" * 50_000, "huge integer"),
+        ("a" + ".a" * 5000 + "=1", "dotted key"),
+        ("kind=0x" + "f" * 50_000, "kind"),
+        ("machine.wheel_diameter=2**2 m", "one finite number"),
+    ],
+)
+def test_settings_that_are_none(setting, words, scene_file):
+    with pytest.raises(BadInput, match=words) as caught:
+        load_scene(scene_file(template("wear")), "wear", [setting])
+    assert len(str(caught.value)) < 1000
+
+
+def test_a_setting_in_any_spelling_of_one_meaning(scene_file):
+    for setting in ("machine.applied_load=1.5 kN", 'machine.applied_load="1.5\u00a0kN"'):
+        assert load_scene(scene_file(template("wear")), "wear", [setting]).machine.applied_load == 1500.0

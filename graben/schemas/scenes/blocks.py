@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from graben.schemas.quantities import Angle, Density, JointStiffness, Length, Pressure, key
+from graben.schemas.quantities import Angle, Density, Integer, JointStiffness, Length, Number, Pressure, Switch, key
 from graben.schemas.scene import InputFile, Model, Scene
 from graben.schemas.scenes.blocks_loading import InSitu, Loading, Numerics, Point, Programme
 
@@ -18,9 +18,14 @@ class Domain(Model):
     width: Length = key("10 m", "width of the rectangle", gt=0)
     height: Length = key("10 m", "height of the rectangle", gt=0)
     outline: list[Point] | None = key(
-        None, "corner points of a polygon, in order around it, instead of the rectangle", min_length=3
+        None,
+        "corner points of a polygon, in order around it, instead of the rectangle",
+        min_length=3,
+        max_length=100_000,
     )
-    holes: list[list[Point]] = key([], "polygons in the domain: blocks whose middle lies in one are left out")
+    holes: list[list[Point]] = key(
+        [], "polygons in the domain: blocks whose middle lies in one are left out", max_length=10_000
+    )
 
     @property
     def corners(self) -> list[Point]:
@@ -39,11 +44,11 @@ class Domain(Model):
 class JointSet(Model):
     """Parallel joints; sets cut the domain one after the other, in the order given."""
 
-    dip: Angle = key(..., "angle of the joints from the x axis, counter-clockwise")
+    dip: Angle = key(..., "angle of the joints from the x axis, counter-clockwise", ge=-7, le=7)
     spacing: Length = key(..., "mean distance between joints", gt=0)
-    persistence: float = key(1.0, "probability that a block which a joint crosses is cut by it", ge=0, le=1)
-    dip_scatter: Angle = key("0 deg", "standard deviation of the angle of each joint", ge=0)
-    spacing_scatter: float = key(0.0, "standard deviation of each distance, over the spacing", ge=0, le=1)
+    persistence: Number = key(1.0, "probability that a block which a joint crosses is cut by it", ge=0, le=1)
+    dip_scatter: Angle = key("0 deg", "standard deviation of the angle of each joint", ge=0, le=1.57)
+    spacing_scatter: Number = key(0.0, "standard deviation of each distance, over the spacing", ge=0, le=1)
 
 
 class Tessellation(Model):
@@ -53,7 +58,7 @@ class Tessellation(Model):
         "voronoi",
         "voronoi: random blocks of one size; joint-sets: cut by sets of parallel joints; file: polygons given",
     )
-    sets: list[JointSet] = key([], "joint-sets: the sets of joints (repeatable)")
+    sets: list[JointSet] = key([], "joint-sets: the sets of joints (repeatable)", max_length=1000)
     file: InputFile | None = key(
         None, "file: polygons that fill the domain, in m, as GeoJSON or the cells of any mesh that meshio reads"
     )
@@ -62,7 +67,7 @@ class Tessellation(Model):
         "nominal edge; a Voronoi block has 0.955 times its square as mean area; other limits scale with it",
         gt=0,
     )
-    lloyd_passes: int = key(4, "passes that even out the blocks", ge=0, le=1000)
+    lloyd_passes: Integer = key(4, "passes that even out the blocks", ge=0, le=1000)
     shortest_edge: Length | None = key(
         None, "shorter edges are collapsed; left out: 0.48 of the edge (voronoi), 0.1 of it (others)", ge=0
     )
@@ -84,14 +89,16 @@ class Rock(Model):
         "elastic: zones deform; mohr-coulomb: they also yield, in shear and in tension; rigid: blocks without zones",
     )
     young: Pressure = key("65 GPa", "Young's modulus (rigid blocks have none)", gt=0)
-    poisson: float = key(0.2, "Poisson's ratio (rigid blocks have none)", gt=-1, lt=0.5)
+    poisson: Number = key(0.2, "Poisson's ratio (rigid blocks have none)", ge=-0.99, le=0.49999)
     density: Density = key("2700 kg/m^3", "density", gt=0)
     friction: Angle | None = key(None, "mohr-coulomb: friction angle; left out: 51 deg", ge=0, le=1.396)
     cohesion: Pressure | None = key(None, "mohr-coulomb: cohesion; left out: 55.1 MPa", ge=0)
     tension: Pressure | None = key(
         None, "mohr-coulomb: tensile strength, cut at the cone's apex; left out: 11.7 MPa", ge=0
     )
-    dilation: Angle | None = key(None, "mohr-coulomb: dilation angle, at most friction; left out: 0 deg", ge=0)
+    dilation: Angle | None = key(
+        None, "mohr-coulomb: dilation angle, at most friction; left out: 0 deg", ge=0, le=1.396
+    )
 
     @property
     def strength(self) -> tuple[float, float, float, float]:
@@ -115,7 +122,9 @@ class Rock(Model):
 class JointsOfSet(Model):
     """Joints of one set that differ from the others; what is left out is as in [joints]."""
 
-    set: int = key(..., "number of the set: the first of [[tessellation.sets]] is 1; as numbered in a file", ge=1)
+    set: Integer = key(
+        ..., "number of the set: the first of [[tessellation.sets]] is 1; as numbered in a file", ge=1, le=1_000_000
+    )
     normal_stiffness: JointStiffness | None = key(None, "normal stiffness", gt=0)
     shear_stiffness: JointStiffness | None = key(None, "shear stiffness", gt=0)
     friction: Angle | None = key(None, "friction angle", ge=0, lt=1.57)
@@ -152,6 +161,7 @@ class Joints(Model):
         [],
         "joint-sets and file: joints of one set with properties of their own (repeatable); where edges of two sets "
         "meet, after blocks have moved, the joint is that of lower friction, then of lower cohesion",
+        max_length=1000,
     )
 
     def of_set(self, number: int) -> Joints:
@@ -163,12 +173,12 @@ class Joints(Model):
 class Output(Model):
     """What is written beside the artifact."""
 
-    balance: bool = key(
+    balance: Switch = key(
         False,
         "also body_force and overlap_moment, with which homogenize closes the balance of stress by zones and by "
         "forces to round-off",
     )
-    vtk: bool = key(True, "VTU files with a PVD for ParaView: zones and, in NAME-joints, contacts")
+    vtk: Switch = key(True, "VTU files with a PVD for ParaView: zones and, in NAME-joints, contacts")
 
 
 class BlocksScene(Scene):

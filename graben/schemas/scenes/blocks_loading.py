@@ -10,11 +10,14 @@ from pydantic import model_validator
 from graben.schemas.quantities import (
     Acceleration,
     Frequency,
+    Integer,
     Length,
+    Number,
     Pressure,
     PressureRate,
     PressureSlope,
     Speed,
+    Switch,
     Time,
     key,
 )
@@ -36,22 +39,24 @@ class Loading(Model):
     """Confinement first, then the top moves down."""
 
     confining_pressure: Pressure = key("0.5 MPa", "normal pressure on the left and right sides", gt=0)
-    vertical_ratio: float = key(0.5, "vertical over confining pressure during consolidation", gt=0)
+    vertical_ratio: Number = key(0.5, "vertical over confining pressure during consolidation", ge=1e-6, le=1e6)
     speed: Speed = key("5 mm/s", "speed of the top, downwards", gt=0)
     speed_course: SpeedCourse | None = key(
         None,
         "speed of the top over time instead of speed: points [time, speed], straight between them, negative upwards; "
         "two points at one time make a jump",
         min_length=1,
+        max_length=100_000,
     )
     confining_course: PressureCourse | None = key(
         None,
         "confining pressure over time: points [time, pressure], straight between them; begins with "
         "confining_pressure at 0 s",
         min_length=1,
+        max_length=100_000,
     )
     duration: Time = key("100 s", "time of loading", gt=0)
-    states: int = key(51, "saved states, the first before loading", ge=2)
+    states: Integer = key(51, "saved states, the first before loading", ge=2, le=1_000_000)
 
     @property
     def largest_travel(self) -> float:
@@ -114,6 +119,7 @@ class Load(Model):
         "pressure over the time of loading instead of pressure and rate: points [time, pressure], straight between "
         "them; the first one is applied with gravity",
         min_length=1,
+        max_length=100_000,
     )
 
     @model_validator(mode="after")
@@ -132,7 +138,9 @@ class Excavation(Model):
     """Blocks taken out of the body while it is loaded."""
 
     name: str = key("excavation", "name, for messages")
-    polygon: list[Point] = key(..., "corner points: blocks whose middle lies in it then go", min_length=3)
+    polygon: list[Point] = key(
+        ..., "corner points: blocks whose middle lies in it then go", min_length=3, max_length=100_000
+    )
     time: Time = key("0 s", "time of loading at which they go", ge=0)
     relax_over: Time = key(
         "0 s", "time of loading over which the forces that they bore fade away; 0 s: they are gone at once", ge=0
@@ -149,11 +157,12 @@ class InSitu(Model):
     syy_rise: PressureSlope = key("0 Pa/m", "rise of the vertical stress per metre upwards")
     sxy_rise: PressureSlope = key("0 Pa/m", "rise of the shear stress per metre upwards")
     level: Length | None = key(None, "height at which the stresses hold; left out: the top of the domain")
-    k0: float | None = key(
+    k0: Number | None = key(
         None,
         "horizontal over vertical stress; the vertical one is then the weight of the rock below the level, plus syy "
         "at the level",
         ge=0,
+        le=1e3,
     )
 
     @model_validator(mode="after")
@@ -169,21 +178,25 @@ class Programme(Model):
 
     horizontal: Acceleration = key("0 m/s^2", "gravity along x")
     vertical: Acceleration = key("-9.81 m/s^2", "gravity along y (upwards positive)")
-    supports: list[Support] = key(_SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)")
-    loads: list[Load] = key(_SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)")
-    excavations: list[Excavation] = key([], "blocks taken out at a time (repeatable)")
+    supports: list[Support] = key(
+        _SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)", max_length=10_000
+    )
+    loads: list[Load] = key(_SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)", max_length=10_000)
+    excavations: list[Excavation] = key([], "blocks taken out at a time (repeatable)", max_length=10_000)
     end: Time = key("100 s", "time of rise after which the run ends without failure (waiting not counted)", gt=0)
     save_every: Time = key("4 s", "time of rise between saved states", gt=0)
-    calm: float = key(
+    calm: Number = key(
         5e-3,
         "loads rise while the mean unbalanced force over the mean zone force is below this, else they wait",
-        gt=0,
+        ge=1e-12,
+        le=1,
     )
-    patience: int = key(
+    patience: Integer = key(
         8000,
         "steps of waiting after which the rock has failed, if the loaded ground still sinks faster than at first; "
         "four times as many if it does not",
         ge=1000,
+        le=10**12,
     )
 
     @model_validator(mode="after")
@@ -196,42 +209,52 @@ class Programme(Model):
 class Numerics(Model):
     """Knobs that trade accuracy for time; left out, fidelity sets them."""
 
-    steps: int | None = key(
-        None, "steps of loading (of a programme's end): fewer means heavier scaled masses, so more inertia", gt=100
+    steps: Integer | None = key(
+        None,
+        "steps of loading (of a programme's end): fewer means heavier scaled masses, so more inertia",
+        gt=100,
+        le=10**12,
     )
-    force_check: float | None = key(
+    force_check: Number | None = key(
         None,
         "loading slows down and speeds up so that lateral stress inside over applied, and bottom over top reaction, "
         "stay this close to 1; left out: the same speed throughout",
-        gt=0,
+        ge=1e-6,
         lt=1,
     )
-    least_steps: int | None = key(
-        None, "force_check: no faster than so many steps for the whole loading; left out: steps", gt=100
+    least_steps: Integer | None = key(
+        None, "force_check: no faster than so many steps for the whole loading; left out: steps", gt=100, le=10**12
     )
-    most_steps: int | None = key(
-        None, "force_check: no slower than so many steps for the whole loading; left out: 8 times steps", gt=100
+    most_steps: Integer | None = key(
+        None,
+        "force_check: no slower than so many steps for the whole loading; left out: 8 times steps",
+        gt=100,
+        le=10**12,
     )
     damping: Literal["adaptive", "local", "viscous"] = key(
         "adaptive",
         "adaptive: a global drag that follows the rate of kinetic energy; local: against each unbalanced force (0.8 "
         "gives strengths of 9 to 16 MPa where 6.6 is right); viscous: a drag of fixed coefficient",
     )
-    damping_ratio: float = key(0.5, "adaptive: power of the damping over the rate of kinetic energy", gt=0)
-    damping_share: float | None = key(
-        None, "local: share of the unbalanced force taken off against the velocity", gt=0, lt=1
+    damping_ratio: Number = key(
+        0.5, "adaptive: power of the damping over the rate of kinetic energy", ge=1e-9, le=1e3
+    )
+    damping_share: Number | None = key(
+        None, "local: share of the unbalanced force taken off against the velocity", ge=1e-9, lt=1
     )
     damping_coefficient: Frequency | None = key(
         None, "viscous: drag over (scaled) mass and velocity, at most one over the time step", ge=0
     )
-    consolidation_tolerance: float = key(1e-3, "unbalanced over mean zone force that ends consolidation", gt=0)
-    energy_limit: float = key(0.05, "largest error of the energy ledger over the work done", gt=0)
-    stop_loose_blocks: bool = key(
+    consolidation_tolerance: Number = key(
+        1e-3, "unbalanced over mean zone force that ends consolidation", ge=1e-12, le=1
+    )
+    energy_limit: Number = key(0.05, "largest error of the energy ledger over the work done", ge=1e-12, le=1e3)
+    stop_loose_blocks: Switch = key(
         False,
         "[loading]: blocks that no other touches are stopped every 250 steps; without weight they would fly for ever",
     )
-    threads: int = key(
-        1, "threads that share a run out, with bitwise the same result; pays from 2000 blocks on", ge=1
+    threads: Integer = key(
+        1, "threads that share a run out, with bitwise the same result; pays from 2000 blocks on", ge=1, le=1024
     )
 
     @model_validator(mode="after")

@@ -6,7 +6,8 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from graben.schemas.quantities import Length, key
+from graben.errors import Refused
+from graben.schemas.quantities import Integer, Length, Number, Switch, key
 from graben.schemas.scene import InputFile, Model, Scene
 from graben.schemas.scenes.material import UNITS, parameter_to_si
 
@@ -14,16 +15,16 @@ from graben.schemas.scenes.material import UNITS, parameter_to_si
 class Prior(Model):
     """What is known of a parameter beforehand: a normal distribution."""
 
-    mean: str | float = key(..., "its middle, in the parameter's unit")
-    deviation: str | float = key(..., "its standard deviation, in the same unit (of a log scale: at the mean)")
+    mean: str | Number = key(..., "its middle, in the parameter's unit")
+    deviation: str | Number = key(..., "its standard deviation, in the same unit (of a log scale: at the mean)")
 
 
 class Free(Model):
     """A free parameter."""
 
-    lower: str | float = key(..., "lower bound, in the parameter's unit")
-    upper: str | float = key(..., "upper bound")
-    initial: str | float | None = key(None, "a guess that every swarm begins with")
+    lower: str | Number = key(..., "lower bound, in the parameter's unit")
+    upper: str | Number = key(..., "upper bound")
+    initial: str | Number | None = key(None, "a guess that every swarm begins with")
     scale: Literal["linear", "log"] = key("linear", "scale on which the search moves")
     prior: Prior | None = key(None, "knowledge from elsewhere: { mean = ..., deviation = ... }")
 
@@ -34,7 +35,7 @@ class CsvFormat(Model):
     sign: Literal["tension-positive", "compression-positive"] = key(
         "tension-positive", "sign of stresses and strains in the file; a confining stress may have either"
     )
-    allow_tension: bool = key(False, "accept curves that pull; otherwise they are taken for a wrong sign")
+    allow_tension: Switch = key(False, "accept curves that pull; otherwise they are taken for a wrong sign")
 
 
 class WeightTable(Model):
@@ -43,38 +44,47 @@ class WeightTable(Model):
     normalise: Literal["curve", "all"] = key(
         "curve", "divide by the largest stress (strain) of each curve, so that none dominates, or of all curves"
     )
-    last: float = key(
+    last: Number = key(
         0.5, "weight of a curve's last point relative to its first, linear in between (Y 4.2)", ge=0, le=10
     )
-    strain: float = key(0.05, "weight of the lateral strain relative to the axial stress", ge=0, le=100)
-    penalty: float = key(2.0, "weight of the part of a curve that a candidate's path cannot reach", ge=0)
-    noise: float = key(
-        0.05, "expected misfit as a fraction of the largest stress: sets what priors weigh against curves", gt=0, le=1
+    strain: Number = key(0.05, "weight of the lateral strain relative to the axial stress", ge=0, le=100)
+    penalty: Number = key(2.0, "weight of the part of a curve that a candidate's path cannot reach", ge=0, le=1e6)
+    noise: Number = key(
+        0.05,
+        "expected misfit as a fraction of the largest stress: sets what priors weigh against curves",
+        ge=1e-9,
+        le=1,
     )
 
 
 class SwarmTable(Model):
     """Budget of the global search and rule of the swarm, Y 2.6.1; keys left out follow the fidelity."""
 
-    starts: int | None = key(None, "searches with different seeds", ge=1, le=1000)
-    particles: int | None = key(None, "particles of each swarm, or population (Y: 24)", ge=2, le=100_000)
-    generations: int | None = key(None, "generations (Y: 100)", ge=0, le=100_000)
-    inertia: float = key(0.73, "inertia omega of Y (2.54) (Y: 1.2)", ge=0, le=2)
-    inertia_reduction: float = key(0.0, "fraction of the inertia lost in each generation (Y: 0.1)", ge=0, lt=1)
-    cognitive: float = key(1.5, "trust in a particle's own best, c1 (Y: 2)", ge=0, le=4)
-    social: float = key(1.5, "trust in the swarm's best, c2 (Y: 2)", ge=0, le=4)
-    constriction: float = key(1.0, "constriction zeta (Y: 1)", gt=0, le=1)
+    starts: Integer | None = key(None, "searches with different seeds", ge=1, le=1000)
+    particles: Integer | None = key(None, "particles of each swarm, or population (Y: 24)", ge=2, le=100_000)
+    generations: Integer | None = key(None, "generations (Y: 100)", ge=0, le=100_000)
+    inertia: Number = key(0.73, "inertia omega of Y (2.54) (Y: 1.2)", ge=0, le=2)
+    inertia_reduction: Number = key(0.0, "fraction of the inertia lost in each generation (Y: 0.1)", ge=0, lt=1)
+    cognitive: Number = key(1.5, "trust in a particle's own best, c1 (Y: 2)", ge=0, le=4)
+    social: Number = key(1.5, "trust in the swarm's best, c2 (Y: 2)", ge=0, le=4)
+    constriction: Number = key(1.0, "constriction zeta (Y: 1)", ge=1e-6, le=1)
 
 
 class RefineTable(Model):
     """Levenberg-Marquardt, Y 2.6.3; keys left out follow the fidelity."""
 
-    best: int | None = key(None, "particles of each swarm to refine, apart from one another", ge=1, le=1000)
-    damping: float = key(1e-2, "first lambda, on scaled columns (Y: 10)", gt=0)
-    factor: float = key(4.0, "ratio of neighbouring trial values of lambda (Y: 1.1)", gt=1)
-    move_limit: float = key(0.1, "largest move in one iteration, as a fraction of a parameter's range", gt=0, le=1)
-    iterations: int = key(40, "at most this many iterations (Y: 20)", ge=0, le=100_000)
+    best: Integer | None = key(None, "particles of each swarm to refine, apart from one another", ge=1, le=1000)
+    damping: Number = key(1e-2, "first lambda, on scaled columns (Y: 10)", ge=1e-15, le=1e15)
+    factor: Number = key(4.0, "ratio of neighbouring trial values of lambda (Y: 1.1)", ge=1.001, le=1e6)
+    move_limit: Number = key(
+        0.1, "largest move in one iteration, as a fraction of a parameter's range", ge=1e-6, le=1
+    )
+    iterations: Integer = key(40, "at most this many iterations (Y: 20)", ge=0, le=100_000)
 
+
+_POPULATIONS = ("differential-evolution", "cma-es")
+_SMALLEST = 5
+"""Smallest population of these searches."""
 
 _FREE: Any = {
     "young_modulus": {"lower": "0.5 GPa", "upper": "25 GPa", "scale": "log"},
@@ -96,7 +106,9 @@ class CalibrateScene(Scene):
 
     kind: Literal["calibrate"]
     curves: list[InputFile] = key(
-        [], "files of curves: artifacts of homogenize, or CSV; files on the command line replace these"
+        [],
+        "files of curves: artifacts of homogenize, or CSV; files on the command line replace these",
+        max_length=10_000,
     )
     test: Literal["plane-strain", "triaxial"] = key(
         "plane-strain",
@@ -109,23 +121,26 @@ class CalibrateScene(Scene):
     )
     free: dict[str, Free] = Field(_FREE, description="parameters to find, with bounds; scale = linear or log")
     length: Length = key("10 m", "characteristic length that the curves stand for, for displacement-based damage")
-    increments: int | None = key(
+    increments: Integer | None = key(
         None, "increments between two points of a curve; follows the fidelity", ge=1, le=1000
     )
     weights: WeightTable = key(WeightTable(), "weights of the residuals")
     search: Literal["swarm", "appso", "dds", "differential-evolution", "cma-es"] = key(
         "swarm", "the global search; appso: a swarm that does not wait for its slowest particle (Y 2.6.2)"
     )
-    staged: bool = key(
+    staged: Switch = key(
         False, "search elastic, hardening and damage parameters one group after the other first, then all (Y 5.2)"
     )
     swarm: SwarmTable = key(SwarmTable(), "budget of the global search")
     refine: RefineTable = key(RefineTable(), "the local search")
-    cross_validation: bool = key(False, "fit again without each curve in turn and predict it")
-    correlation_length: int = key(
-        5, "points along a curve over which residuals are taken as correlated, for the standard errors", ge=0
+    cross_validation: Switch = key(False, "fit again without each curve in turn and predict it")
+    correlation_length: Integer = key(
+        5,
+        "points along a curve over which residuals are taken as correlated, for the standard errors",
+        ge=0,
+        le=1_000_000,
     )
-    workers: int = key(1, "threads (appso: processes); the numbers do not depend on it", ge=1, le=1024)
+    workers: Integer = key(1, "threads (appso: processes); the numbers do not depend on it", ge=1, le=1024)
     csv: CsvFormat = key(CsvFormat(), "how to read CSV")
 
     @model_validator(mode="after")
@@ -136,12 +151,17 @@ class CalibrateScene(Scene):
         for name, value in self.fixed.items():
             try:
                 parameter_to_si(self.law, name, value)
-            except ValueError as error:
+            except Refused as error:
                 faults.append(f"fixed.{name} = {value!r}: expected {error}")
         for name, free in self.free.items():
             faults += self._free_faults(name, free)
             if name in self.fixed:
                 faults.append(f"free.{name}: expected either free or fixed, not both")
+        if self.search in _POPULATIONS and (self.swarm.particles or _SMALLEST) < _SMALLEST:
+            faults.append(
+                f"swarm.particles = {self.swarm.particles}: expected at least {_SMALLEST}, "
+                f'because search = "{self.search}"'
+            )
         if not self.free:
             faults.append("free: expected at least one parameter")
         if faults:
@@ -159,7 +179,7 @@ class CalibrateScene(Scene):
                 continue
             try:
                 numbers[part] = parameter_to_si(self.law, name, value)
-            except ValueError as error:
+            except Refused as error:
                 faults.append(f"free.{name}.{part} = {value!r}: expected {error}")
         if faults:
             return faults
@@ -179,7 +199,7 @@ class CalibrateScene(Scene):
             value = getattr(free.prior, part)
             try:
                 number = parameter_to_si(self.law, name, value)
-            except ValueError as error:
+            except Refused as error:
                 faults.append(f"free.{name}.prior.{part} = {value!r}: expected {error}")
                 continue
             if part == "mean" and not lower <= number <= upper:

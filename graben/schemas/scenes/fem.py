@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from graben.schemas.quantities import Acceleration, Density, Length, Pressure, PressureRate, Time, key
+from graben.schemas.quantities import (
+    Acceleration,
+    Density,
+    Integer,
+    Length,
+    Number,
+    Pressure,
+    PressureRate,
+    Switch,
+    Time,
+    key,
+)
 from graben.schemas.scene import InputFile, Model, Scene
 from graben.schemas.scenes.material import MaterialTable
 
 Point = tuple[Length, Length]
+Corner = Annotated[Integer, Field(ge=0, lt=100_000)]
 
 _SLOPE_CORNERS: Any = [
     ["0 m", "0 m"],
@@ -79,7 +91,7 @@ class Refine(Model):
     start: Point = key(..., "one end of the segment")
     end: Point = key(..., "the other end (the same point for a spot)")
     size: Length = key(..., "element size at the segment", gt=0)
-    growth: float = key(0.1, "growth of the size per metre of distance", ge=0)
+    growth: Number = key(0.1, "growth of the size per metre of distance", ge=0, le=1e6)
 
 
 class Mesh(Model):
@@ -91,15 +103,17 @@ class Mesh(Model):
         "file: quads of a file that meshio reads",
     )
     size: Length = key("1.8 m", "element size away from refinements, at standard fidelity", gt=0)
-    refine: list[Refine] = key([_UNDER_LOAD], "a segment with smaller elements near it (repeatable)")
-    corners: list[Point] = key(_SLOPE_CORNERS, "mapped: corner points of the patches")
-    patches: list[tuple[int, int, int, int]] = key(
-        _SLOPE_PATCHES, "mapped: four corner numbers (from 0) of each patch, in order around it"
+    refine: list[Refine] = key(
+        [_UNDER_LOAD], "a segment with smaller elements near it (repeatable)", max_length=10_000
     )
-    outline: list[Point] = key(_SLOPE_OUTLINE, "paved: corner points of the polygon, in order")
+    corners: list[Point] = key(_SLOPE_CORNERS, "mapped: corner points of the patches", max_length=100_000)
+    patches: list[tuple[Corner, Corner, Corner, Corner]] = key(
+        _SLOPE_PATCHES, "mapped: four corner numbers (from 0) of each patch, in order around it", max_length=100_000
+    )
+    outline: list[Point] = key(_SLOPE_OUTLINE, "paved: corner points of the polygon, in order", max_length=100_000)
     file: InputFile | None = key(None, "file: mesh file with 4-node quads (Gmsh, VTU, Abaqus, ...), coordinates in m")
-    draft_factor: float = key(2.7, "all sizes are multiplied by this at draft fidelity", ge=1)
-    reference_factor: float = key(0.33, "all sizes are multiplied by this at reference fidelity", gt=0, le=1)
+    draft_factor: Number = key(2.7, "all sizes are multiplied by this at draft fidelity", ge=1, le=1e3)
+    reference_factor: Number = key(0.33, "all sizes are multiplied by this at reference fidelity", ge=1e-3, le=1)
 
     @model_validator(mode="after")
     def _file_for_method(self) -> Self:
@@ -149,22 +163,22 @@ class Stepping(Model):
     largest: Time = key("2 s", "largest step", gt=0)
     smallest: Time = key("0.02 s", "a step that fails is halved; failure is declared below this length", gt=0)
     save_every: Time = key("4 s", "load time between saved states (the last state is always saved)", gt=0)
-    tolerance: float = key(1e-6, "unbalanced force over the largest of loads and reactions", gt=0, lt=1e-2)
-    max_iterations: int = key(20, "factorisations per step", ge=3)
+    tolerance: Number = key(1e-6, "unbalanced force over the largest of loads and reactions", ge=1e-14, lt=1e-2)
+    max_iterations: Integer = key(20, "factorisations per step", ge=3, le=10_000)
     relaxation: Time = key(
         "0 s",
         "viscous stabilisation, off at 0 s: a Kelvin-Voigt stress, this time times the elastic stiffness times the "
         "strain rate, beside the law's own. It carries a march past states at which Newton finds no way",
         ge=0,
     )
-    overload: float = key(
+    overload: Number = key(
         0.02,
         "with stabilisation: failure is declared once viscous stress carries more than this part of the pressure; "
         "the failure load is the largest pressure that the law itself carried",
-        gt=0,
+        ge=1e-9,
         lt=1,
     )
-    extrapolate: bool = key(True, "start each step from the last increment (fewer iterations on a smooth path)")
+    extrapolate: Switch = key(True, "start each step from the last increment (fewer iterations on a smooth path)")
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -187,9 +201,11 @@ class FemScene(Scene):
     )
     gravity: Gravity = key(Gravity(), "weight")
     supports: list[Support] = key(
-        _SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)", min_length=1
+        _SLOPE_SUPPORTS, "a support along a segment of the outline (repeatable)", min_length=1, max_length=10_000
     )
-    loads: list[Load] = key(_SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)", min_length=1)
+    loads: list[Load] = key(
+        _SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)", min_length=1, max_length=10_000
+    )
     stepping: Stepping = key(Stepping(), "load steps")
 
     @model_validator(mode="after")

@@ -10,17 +10,21 @@ hardening = "exponential"       # a word
 
 from __future__ import annotations
 
-import tomllib
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
 from pydantic import model_validator
 
-from graben.errors import BadInput, Fault
+from graben.errors import BadInput, Fault, Refused
 from graben.schemas.files import whole_file
-from graben.schemas.quantities import key, to_si
+from graben.schemas.quantities import key, plain_number, to_si
+from graben.schemas.reading import parse_toml, read_toml
 from graben.schemas.scene import InputFile, Model
+
+_LARGEST = 1e12
+"""Largest magnitude of a dimensionless parameter."""
 
 _ELASTIC = {"young_modulus": "Pa", "poisson_ratio": "1"}
 _DUCTILE = {
@@ -108,34 +112,36 @@ UNITS: dict[str, dict[str, str]] = {
 
 
 def parameter_to_si(law: str, name: str, value: Any) -> Any:
-    """One value as files give it -> a float in SI, a word, or rows of floats. ValueError says what was expected."""
+    """One value as files give it -> a float in SI, a word, or rows of floats. Refused says what was expected."""
     unit = UNITS[law].get(name)
     if unit is None:
-        raise ValueError(f"a parameter of {law}: {', '.join(UNITS[law])}")
+        raise Refused(f"a parameter of {law}: {', '.join(UNITS[law])}")
     if unit == "word" and isinstance(value, list | tuple) and f"{name}_table" in UNITS[law]:
         unit = "table"  # rows instead of the word "table" with rows elsewhere
     if unit == "word":
         if not isinstance(value, str):
-            raise ValueError("a word")
+            raise Refused("a word")
         return value
     if unit == "table":
         if not isinstance(value, list | tuple) or not all(isinstance(r, list | tuple) and len(r) == 2 for r in value):
-            raise ValueError('rows of plastic strain and stress, such as [[0.0, "60 MPa"], [0.1, "90 MPa"]]')
-        return [[_number(x), to_si(y, "Pa")] for x, y in value]
+            raise Refused('rows of plastic strain and stress, such as [[0.0, "60 MPa"], [0.1, "90 MPa"]]')
+        return [[_number(x), to_si(y, "Pa", tiny=True)] for x, y in value]
     if unit == "1":
         return _number(value)
-    return to_si(value, unit)
+    return to_si(value, unit, tiny=True)  # a fit may end at 1e-17
 
 
 def _number(value: Any) -> float:
     """A bare number, or a dimensionless quantity such as "5 %"."""
-    if isinstance(value, bool):
-        raise ValueError("a number")
-    if isinstance(value, int | float):
-        return float(value)
     if isinstance(value, str) and value.strip().endswith("%"):
-        return to_si(value.strip()[:-1] + " * 0.01", "dimensionless")
-    raise ValueError("a bare number (dimensionless)")
+        number = 0.01 * plain_number(value.strip()[:-1])
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        number = float(value) if abs(value) <= _LARGEST else math.inf
+    else:
+        raise Refused("a bare number (dimensionless)")
+    if not abs(number) <= _LARGEST:
+        raise Refused(f"a finite number of at most {_LARGEST:g}")
+    return number
 
 
 def _convert(law: Any, parameters: Any) -> tuple[dict[str, Any], list[tuple[str, Any, str]]]:
@@ -149,7 +155,7 @@ def _convert(law: Any, parameters: Any) -> tuple[dict[str, Any], list[tuple[str,
     for name, value in parameters.items():
         try:
             values[name] = parameter_to_si(law, name, value)
-        except ValueError as error:
+        except Refused as error:
             faults.append((f"parameters.{name}", value, str(error)))
     return values, faults
 
@@ -190,16 +196,14 @@ def read_material(path: str | Path) -> tuple[str, dict[str, Any]]:
     if path.suffix == ".nc":
         from graben.schemas.artifact import read_artifact
 
-        text = str(read_artifact(path, "calibration").attrs["material"])
-    else:
         try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise BadInput(Fault(str(path), "", "", f"a readable material file ({error})")) from None
-    try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise BadInput(Fault(str(path), "", "", f"valid TOML ({error})")) from None
+            tables = parse_toml(str(read_artifact(path, "calibration").attrs["material"]))
+        except ValueError as error:
+            if isinstance(error, BadInput):
+                raise
+            raise BadInput(Fault(str(path), "material", "", f"valid TOML ({error})")) from None
+    else:
+        _, tables = read_toml(path, "material file")
     extra = [
         Fault(str(path), k, "", "no such key (law, parameters)") for k in tables if k not in ("law", "parameters")
     ]

@@ -6,7 +6,17 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from graben.schemas.quantities import Acceleration, ContactStiffness, Density, Length, Pressure, key
+from graben.schemas.quantities import (
+    Acceleration,
+    ContactStiffness,
+    Density,
+    Integer,
+    Length,
+    Number,
+    Pressure,
+    Switch,
+    key,
+)
 from graben.schemas.scene import Model, Scene
 
 
@@ -15,7 +25,7 @@ class GrainSize(Model):
 
     name: str = key(..., "name of the class", min_length=1, examples=["grains"])
     diameter: Length = key(..., "diameter", gt=0, examples=["100 um"])
-    share: float = key(1.0, "volume share of the class; the shares sum to 1", ge=0, le=1)
+    share: Number = key(1.0, "volume share of the class; the shares sum to 1", ge=0, le=1)
     density: Density = key("2200 kg/m^3", "density (default: quartz sand, H table 8.3)", gt=0)
 
 
@@ -33,12 +43,14 @@ class Contact(Model):
     normal_stiffness: ContactStiffness | None = key(
         None, "of one grain; left out: such that the pressure gives the overlap below", gt=0
     )
-    overlap: float = key(0.005, "mean overlap over the smallest diameter at the pressure", gt=0, le=0.05)
-    wall_stiffness_ratio: float = key(10.0, "stiffness of floor, piston and walls over that of a grain", gt=0)
-    shear_ratio: float = key(0.8, "tangential over normal stiffness (where friction acts)", gt=0)
-    friction: float = key(0.0, "Coulomb friction between grains; 0 switches rotation and history off", ge=0)
-    wall_friction: float = key(0.0, "Coulomb friction on floor, piston and walls", ge=0)
-    damping: float = key(0.3, "viscous damping of a contact over critical damping, H (4.10)", ge=0, le=1)
+    overlap: Number = key(0.005, "mean overlap over the smallest diameter at the pressure", ge=1e-9, le=0.05)
+    wall_stiffness_ratio: Number = key(
+        10.0, "stiffness of floor, piston and walls over that of a grain", ge=1e-6, le=1e6
+    )
+    shear_ratio: Number = key(0.8, "tangential over normal stiffness (where friction acts)", ge=1e-6, le=1e3)
+    friction: Number = key(0.0, "Coulomb friction between grains; 0 switches rotation and history off", ge=0, le=1e3)
+    wall_friction: Number = key(0.0, "Coulomb friction on floor, piston and walls", ge=0, le=1e3)
+    damping: Number = key(0.3, "viscous damping of a contact over critical damping, H (4.10)", ge=0, le=1)
 
 
 class Loading(Model):
@@ -46,41 +58,49 @@ class Loading(Model):
 
     gravity: Acceleration = key("9.81 m/s^2", "gravity", gt=0)
     pressure: Pressure = key("30 Pa", "pressure of the piston; see docs for why it need not be the machine's", gt=0)
-    ramp: float = key(5.0, "time over which the pressure rises, in half periods of the bed's slowest mode", gt=0)
+    ramp: Number = key(
+        5.0, "time over which the pressure rises, in half periods of the bed's slowest mode", ge=1e-3, le=1e6
+    )
 
 
 class Shaking(Model):
     """Vertical harmonic motion of the floor after settling."""
 
-    cycles: int = key(50, "number of cycles", gt=0)
-    amplitude: float = key(0.1, "amplitude over the smallest diameter", gt=0)
-    acceleration: float = key(2.0, "peak acceleration over gravity", gt=0)
+    cycles: Integer = key(50, "number of cycles", gt=0, le=10**9)
+    amplitude: Number = key(0.1, "amplitude over the smallest diameter", ge=1e-9, le=1e3)
+    acceleration: Number = key(2.0, "peak acceleration over gravity", ge=1e-9, le=1e6)
 
 
 class Numerics(Model):
     """Knobs that trade accuracy for time; left out, fidelity sets them."""
 
-    safety: float | None = key(None, "time step over the estimated critical one", gt=0, le=1)
-    rest: float | None = key(
-        None, "kinetic energy over weight times smallest radius at which a poured bed has settled", gt=0
+    safety: Number | None = key(None, "time step over the estimated critical one", ge=1e-6, le=1)
+    rest: Number | None = key(
+        None, "kinetic energy over weight times smallest radius at which a poured bed has settled", ge=1e-30, le=1e6
     )
-    balance: float | None = key(None, "unbalanced force over mean contact force at which the bed is at rest", gt=0)
-    loose_fraction: float = key(0.25, "solid fraction of the column that is poured", gt=0, le=0.35)
-    energy_limit: float = key(0.05, "largest allowed error of the energy balance", gt=0)
-    max_steps: int = key(2_000_000, "steps after which a bed that does not come to rest is given up", gt=0)
+    balance: Number | None = key(
+        None, "unbalanced force over mean contact force at which the bed is at rest", ge=1e-15, le=1e3
+    )
+    loose_fraction: Number = key(0.25, "solid fraction of the column that is poured", ge=0.01, le=0.35)
+    energy_limit: Number = key(0.05, "largest allowed error of the energy balance", ge=1e-12, le=1e3)
+    max_steps: Integer = key(
+        2_000_000, "steps after which a bed that does not come to rest is given up", gt=0, le=10**12
+    )
 
 
 class Output(Model):
     """What is written beside the artifact."""
 
-    vtk: bool = key(True, "VTU files with a PVD for ParaView, one per phase, of the first bed")
+    vtk: Switch = key(True, "VTU files with a PVD for ParaView, one per phase, of the first bed")
 
 
 class ParticlesScene(Scene):
     """A bed of grains: settle, press, count the grains that push on the floor."""
 
     kind: Literal["particles"]
-    beds: int = key(1, "beds with seeds seed, seed + 1, ...; their scatter gives the confidence interval", ge=1)
+    beds: Integer = key(
+        1, "beds with seeds seed, seed + 1, ...; their scatter gives the confidence interval", ge=1, le=100_000
+    )
     box: Box = key(default_factory=Box, description="the box")
     grains: tuple[GrainSize, ...] = key(
         ...,

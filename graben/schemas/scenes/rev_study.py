@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import field_validator, model_validator
 
-from graben.schemas.quantities import Length, key
+from graben.schemas.quantities import Integer, Length, Number, key
 from graben.schemas.scene import InputFile, Model, Scene
 
 Property = Literal["secant_modulus", "poisson_ratio", "peak_stress", "strain_at_peak", "dilation"]
@@ -17,10 +17,17 @@ class Samples(Model):
     """Where the averages are taken."""
 
     radii: tuple[Length, ...] = key(
-        ("1 m", "1.5 m", "2 m", "2.5 m", "3 m", "3.5 m", "4 m"), "radii of the REV, rising", min_length=2
+        ("1 m", "1.5 m", "2 m", "2.5 m", "3 m", "3.5 m", "4 m"),
+        "radii of the REV, rising",
+        min_length=2,
+        max_length=10_000,
     )
-    centres: tuple[tuple[Length, Length], ...] = key((), "their centres, [x, y] each; none: a grid (see grid)")
-    grid: int = key(3, "centres per side of a square grid, as wide as the largest radius leaves room", ge=1, le=50)
+    centres: tuple[tuple[Length, Length], ...] = key(
+        (), "their centres, [x, y] each; none: a grid (see grid)", max_length=100_000
+    )
+    grid: Integer = key(
+        3, "centres per side of a square grid, as wide as the largest radius leaves room", ge=1, le=50
+    )
 
     @field_validator("radii")
     @classmethod
@@ -36,7 +43,7 @@ class Curves(Model):
     properties: tuple[Property, ...] = key(
         ("secant_modulus", "peak_stress"), "the scalars that must settle before a radius is recommended", min_length=1
     )
-    secant_level: float = key(0.5, "part of the rise to the peak at which the secant is taken", gt=0, lt=1)
+    secant_level: Number = key(0.5, "part of the rise to the peak at which the secant is taken", ge=1e-6, le=0.999999)
 
 
 class Tests(Model):
@@ -44,10 +51,12 @@ class Tests(Model):
 
     __test__ = False  # not a test of pytest's
 
-    confidence: float = key(0.95, "confidence of intervals and tests", gt=0.5, lt=1)
-    tolerance: float = key(0.05, "largest relative difference of a mean from that at the largest radius", gt=0, lt=1)
-    variation: float = key(0.10, "largest coefficient of variation to be accepted", gt=0, lt=1)
-    resamples: int | None = key(
+    confidence: Number = key(0.95, "confidence of intervals and tests", gt=0.5, le=0.999999)
+    tolerance: Number = key(
+        0.05, "largest relative difference of a mean from that at the largest radius", ge=1e-9, lt=1
+    )
+    variation: Number = key(0.10, "largest coefficient of variation to be accepted", ge=1e-9, lt=1)
+    resamples: Integer | None = key(
         None, "draws of the bootstrap (fidelity: draft 500, standard 2000, reference 20000)", ge=100, le=1_000_000
     )
 
@@ -71,7 +80,7 @@ class RevStudyScene(Scene):
     curves: Curves = key(Curves(), "what is read off the average curves")
     tests: Tests = key(Tests(), "when a scalar counts as settled")
     calibration: Calibration | None = key(None, "calibrated parameters instead of scalars of the curves (off)")
-    processes: int = key(
+    processes: Integer = key(
         0, "processes that share the samples (0: one per core); the result is the same", ge=0, le=1024
     )
 

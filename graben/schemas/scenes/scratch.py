@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import BeforeValidator, model_validator
 
-from graben.schemas.quantities import Density, Length, key
+from graben.errors import Refused
+from graben.schemas.quantities import Density, Integer, Length, Number, key
 from graben.schemas.scene import Model, Scene
 from graben.schemas.scenes.material import MaterialTable
 
@@ -50,17 +51,17 @@ class Mesh(Model):
     """Bricks: fine under the path, growing outside."""
 
     size: Length = key("1.5 um", "edge under the path at standard fidelity", gt=0)
-    growth: float = key(1.25, "ratio of neighbouring edges outside the fine range", ge=1, le=2)
-    growth_depth: float = key(1.12, "the same from the surface down", ge=1, le=2)
-    draft_factor: float = key(1.7, "the edge is multiplied by this at draft fidelity", ge=1)
-    reference_factor: float = key(0.75, "the edge is multiplied by this at reference fidelity", gt=0, le=1)
+    growth: Number = key(1.25, "ratio of neighbouring edges outside the fine range", ge=1, le=2)
+    growth_depth: Number = key(1.12, "the same from the surface down", ge=1, le=2)
+    draft_factor: Number = key(1.7, "the edge is multiplied by this at draft fidelity", ge=1, le=1e3)
+    reference_factor: Number = key(0.75, "the edge is multiplied by this at reference fidelity", ge=1e-3, le=1)
 
 
 class Tip(Model):
     """Rigid sphere and its path."""
 
     radius: Length = key("50 um", "radius of the sphere", gt=0)
-    friction: float = key(0.1, "Coulomb friction between grain and specimen", ge=0, le=2)
+    friction: Number = key(0.1, "Coulomb friction between grain and specimen", ge=0, le=2)
     depth: Length = key("2 um", "depth of indentation below the first surface, held while sliding", gt=0)
     start: Length = key("50 um", "position of the indentation along the specimen", gt=0)
     path: Length = key("60 um", "sliding distance; 0 um only indents (H slides 100 um)", ge=0)
@@ -69,43 +70,52 @@ class Tip(Model):
 class Damage(Model):
     """Limits of ERVE damage in the run; takes a material with law "erve"."""
 
-    growth_per_joule: float = key(
+    growth_per_joule: Number = key(
         3e5,
         "alpha of H (6.98): largest growth of damage per joule of work of the tip on the specimen. H prints 0.05 "
         "with units that change; too small does nothing, too large deletes the track: a study, not a constant",
-        gt=0,
+        ge=1e-12,
+        le=1e21,
     )
-    remove_at: float = key(0.95, "elements whose damage 1 - f reaches this are removed", gt=0, lt=1)
+    remove_at: Number = key(0.95, "elements whose damage 1 - f reaches this are removed", ge=1e-6, lt=1)
+
+
+def _one_or_eight(value: Any) -> Any:
+    if isinstance(value, bool):  # true counts as 1
+        raise Refused("1 or 8")
+    return value
 
 
 class Numerics(Model):
     """What trades accuracy for time. Speeds are top speeds as shares of the longitudinal wave speed."""
 
-    points: Literal[1, 8] = key(
+    points: Annotated[Literal[1, 8], BeforeValidator(_one_or_eight)] = key(
         1, "integration points: 1 with hourglass control, or 8 with mean dilatation (reference)"
     )
-    indent_speed: float = key(0.003, "indentation; faster makes the tip bounce", gt=0, le=0.1)
-    slide_speed: float = key(0.02, "sliding", gt=0, le=0.1)
-    lift_speed: float = key(0.006, "lifting", gt=0, le=0.1)
-    draft_speed_factor: float = key(2.0, "speeds are multiplied by this at draft fidelity", ge=1, le=10)
-    reference_speed_factor: float = key(0.5, "speeds are multiplied by this at reference fidelity", gt=0, le=1)
-    safety: float = key(0.8, "step over volume / largest face / wave speed", gt=0, le=1)
-    floor: float = key(0.3, "share of the first step below which an element gets mass instead", gt=0, le=1)
-    mass_cap: float = key(0.05, "the run stops when added mass exceeds this share of the specimen's", ge=0)
-    refresh: int = key(25, "steps between refreshes of the step, of removal and of the history", ge=1, le=500)
-    hourglass: float = key(0.02, "hourglass stiffness over the elastic bending stiffness", ge=0, le=1)
-    viscosity: float = key(0.06, "linear bulk viscosity, share of the critical one", ge=0, le=0.5)
-    penalty: float = key(0.5, "contact stiffness over E A / h of the surface element", gt=0, le=5)
-    energy_limit: float = key(0.03, "the run stops at this energy error, share of the external work", gt=0, le=1)
-    volume_limit: float = key(0.02, "without damage, the run stops when det F leaves 1 by this", gt=0, le=0.5)
+    indent_speed: Number = key(0.003, "indentation; faster makes the tip bounce", ge=1e-9, le=0.1)
+    slide_speed: Number = key(0.02, "sliding", ge=1e-9, le=0.1)
+    lift_speed: Number = key(0.006, "lifting", ge=1e-9, le=0.1)
+    draft_speed_factor: Number = key(2.0, "speeds are multiplied by this at draft fidelity", ge=1, le=10)
+    reference_speed_factor: Number = key(0.5, "speeds are multiplied by this at reference fidelity", ge=1e-3, le=1)
+    safety: Number = key(0.8, "step over volume / largest face / wave speed", ge=1e-3, le=1)
+    floor: Number = key(0.3, "share of the first step below which an element gets mass instead", ge=1e-6, le=1)
+    mass_cap: Number = key(0.05, "the run stops when added mass exceeds this share of the specimen's", ge=0, le=1e6)
+    refresh: Integer = key(25, "steps between refreshes of the step, of removal and of the history", ge=1, le=500)
+    hourglass: Number = key(0.02, "hourglass stiffness over the elastic bending stiffness", ge=0, le=1)
+    viscosity: Number = key(0.06, "linear bulk viscosity, share of the critical one", ge=0, le=0.5)
+    penalty: Number = key(0.5, "contact stiffness over E A / h of the surface element", ge=1e-6, le=5)
+    energy_limit: Number = key(0.03, "the run stops at this energy error, share of the external work", ge=1e-12, le=1)
+    volume_limit: Number = key(0.02, "without damage, the run stops when det F leaves 1 by this", ge=1e-12, le=0.5)
 
 
 class Output(Model):
     """What is saved."""
 
-    frames: int = key(4, "states saved while sliding, besides the ends of the phases", ge=0, le=1000)
-    sections: int = key(61, "sections across the track, from one end of the fine range to the other", ge=3, le=2000)
-    points: int = key(181, "points per section", ge=11, le=5000)
+    frames: Integer = key(4, "states saved while sliding, besides the ends of the phases", ge=0, le=1000)
+    sections: Integer = key(
+        61, "sections across the track, from one end of the fine range to the other", ge=3, le=2000
+    )
+    points: Integer = key(181, "points per section", ge=11, le=5000)
 
 
 class ScratchScene(Scene):

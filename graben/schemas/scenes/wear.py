@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from graben.schemas.quantities import AngularSpeed, Area, Force, Length, key
+from graben.schemas.quantities import AngularSpeed, Area, Force, Length, Number, key
 from graben.schemas.scene import InputFile, Model, Scene
+
+Share = Annotated[Number, Field(ge=0, le=1)]
 
 
 class Groove(Model):
@@ -15,7 +17,7 @@ class Groove(Model):
 
     force: Force = key(..., "normal force on the grain", gt=0, examples=["2 N"])
     area: Area = key(..., "cross-section of the groove below the old surface", gt=0, examples=["88.4 um^2"])
-    degree_of_wear: float = key(
+    degree_of_wear: Number = key(
         ..., "f_ab: part of the groove that is gone, not pushed to its shoulders", ge=-1, le=1, examples=[0.37]
     )
 
@@ -35,12 +37,12 @@ class Mixture(Model):
     """Grains in shares of volume."""
 
     name: str = key(..., "name of the mixture", min_length=1, examples=["homogeneous"])
-    shares: dict[str, float] = key(..., "class name -> volume share; sums to 1", examples=[{"fine": 1.0}])
+    shares: dict[str, Share] = key(..., "class name -> volume share; sums to 1", examples=[{"fine": 1.0}])
 
     @model_validator(mode="after")
     def _partition(self) -> Mixture:
-        if any(s < 0 for s in self.shares.values()) or abs(sum(self.shares.values()) - 1.0) > 1e-6:
-            raise ValueError(f"shares >= 0 with sum 1 (found {sum(self.shares.values()):g})")
+        if abs(sum(self.shares.values()) - 1.0) > 1e-6:
+            raise ValueError(f"shares with sum 1 (found {sum(self.shares.values()):g})")
         return self
 
 
