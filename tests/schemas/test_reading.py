@@ -6,12 +6,12 @@ import threading
 import pytest
 
 from graben.errors import BadInput
-from graben.schemas.check import check
 from graben.schemas.polygon_file import read_polygons
 from graben.schemas.reading import MiB, read_bytes, read_json, read_text, read_toml
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.material import read_material
 from graben.schemas.template import template
+from graben.stages.check import check
 from graben.stages.measured import Reading, read_measured
 
 READERS = {
