@@ -1,8 +1,8 @@
 """The errors that graben raises on purpose; one family, so that a caller can tell them from faults of the program.
 
-``BadInput`` is exit code 2 on the command line, ``NumericsFailed`` and ``NotFinite`` are 3. Mechanics, which knows
-no file, raises ``Refused`` for input that it cannot take; the stage turns it into ``BadInput`` with the file and key.
-A plain ``ValueError`` is a fault of the program.
+``BadInput`` is exit code 2 on the command line; ``NumericsFailed``, ``NotFinite`` and ``MachineFailed`` are 3.
+Mechanics, which knows no file, raises ``Refused`` for input that it cannot take; the stage turns it into ``BadInput``
+with the file and key. A plain ``ValueError`` is a fault of the program.
 """
 
 from __future__ import annotations
@@ -51,6 +51,17 @@ class Refused(GrabenError, ValueError):
 
 class NotFinite(GrabenError, ArithmeticError):
     """A result to be written holds nan or infinity where its layout allows none."""
+
+
+class MachineFailed(GrabenError):
+    """The machine refused what a run needs: space, permission, or a folder that went away. Names path and reason."""
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path, self.reason = path, reason
+        super().__init__(f"{path}: cannot be written ({reason})")
+
+    def __reduce__(self) -> tuple[type[MachineFailed], tuple[str, str]]:
+        return MachineFailed, (self.path, self.reason)
 
 
 class NumericsFailed(GrabenError, RuntimeError):

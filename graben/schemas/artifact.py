@@ -61,6 +61,7 @@ def write_artifact(
     Raises
     ------
     NotFinite : nan or infinity where the layout allows none
+    MachineFailed : no room, no permission
     ValueError : the arrays do not fit the layout (a fault of the program, not of its user)
     """
     import xarray
@@ -103,7 +104,10 @@ def write_artifact(
         if name in dataset.variables and dataset[name].dtype.kind == "f":
             encoding.setdefault(name, {})["_FillValue"] = np.nan if declared.may_be_nan else None
     with whole_file(path) as temporary:
-        dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
+        try:
+            dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
+        except RuntimeError as error:
+            raise OSError(f"{error}") from error  # what the library makes of a full disk
 
 
 def _refuse_non_finite(kind: str, name: str, declared: Variable, array: np.ndarray) -> None:

@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from graben.schemas.files import whole_file
+from graben.schemas.files import together, whole_file
+from graben.schemas.outputs import FOLDER, PVD, beside, owner_mark
 
 
-def write_vtu(
-    path: str | Path,
+def write_vtu(path: str | Path, *fields: Any) -> None:
+    """Write one unstructured grid, a whole file or none; `fields` as for `vtu_bytes`."""
+    text = vtu_bytes(*fields)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(text)
+
+
+def vtu_bytes(
     points: np.ndarray,
     cells: Mapping[str, np.ndarray],
     point_data: Mapping[str, np.ndarray] | None = None,
     cell_data: Mapping[str, np.ndarray] | None = None,
-) -> None:
-    """Write one unstructured grid.
+) -> bytes:
+    """One unstructured grid as the text of a VTU file.
+
+    VTK's own writing to a file ends without an error, or ends the process, where the disk is full.
 
     Parameters
     ----------
@@ -31,6 +40,7 @@ def write_vtu(
         (xx, yy, zz, xy, yz, zx), the order that VTK uses too
     """
     import pyvista
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
     types = {
         "vertex": pyvista.CellType.VERTEX,
@@ -50,8 +60,13 @@ def write_vtu(
         grid.point_data[name] = _three(values) if _is_plane_vector(values) else np.asarray(values)
     for name, values in (cell_data or {}).items():
         grid.cell_data[name] = _three(values) if _is_plane_vector(values) else np.asarray(values)
-    with whole_file(path) as temporary:
-        grid.save(temporary, binary=True)
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(grid)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    if not writer.Write():
+        raise RuntimeError(f"VTK wrote no grid of {len(points)} points")
+    return str(writer.GetOutputString()).encode()
 
 
 def _is_plane_vector(values: Any) -> bool:
@@ -67,30 +82,11 @@ def _three(vectors: np.ndarray) -> np.ndarray:
 
 
 class VtuSeries:
-    """VTU files of a run in the folder ``NAME.vtu/`` and a ``NAME.pvd`` beside it, written last.
+    """The states of a series that is being written; see `vtu_series`."""
 
-    >>> with VtuSeries("results/run.nc") as series:          # doctest: +SKIP
-    ...     series.add(0.0, points, {"triangle": triangles})
-
-    Leaving the block puts the files in place; leaving it by an exception leaves nothing.
-    """
-
-    def __init__(self, artifact: str | Path) -> None:
-        artifact = Path(artifact)
-        self.pvd = artifact.with_suffix(".pvd")
-        self.folder = artifact.with_suffix(".vtu")
-        self._building = artifact.with_name(f".{artifact.stem}.part.vtu")
-        shutil.rmtree(self._building, ignore_errors=True)
-        self._times: list[float] = []
-
-    def __enter__(self) -> VtuSeries:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: object, trace: object) -> None:
-        if kind is None:
-            self.close()
-        else:
-            self.discard()
+    def __init__(self, building: Path) -> None:
+        self._building = building
+        self.times: list[float] = []
 
     def add(
         self,
@@ -100,26 +96,36 @@ class VtuSeries:
         point_data: Mapping[str, np.ndarray] | None = None,
         cell_data: Mapping[str, np.ndarray] | None = None,
     ) -> None:
-        """Write the next state; see `write_vtu`."""
-        write_vtu(self._building / f"{len(self._times):04d}.vtu", points, cells, point_data, cell_data)
-        self._times.append(float(time))
+        """Write the next state; see `vtu_bytes`."""
+        text = vtu_bytes(points, cells, point_data, cell_data)
+        (self._building / f"{len(self.times):04d}.vtu").write_bytes(text)
+        self.times.append(float(time))
 
-    def close(self) -> Path:
-        """Put the folder in place and write the PVD; returns its path."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-        self._building.rename(self.folder)
+
+@contextmanager
+def vtu_series(artifact: str | Path, tag: str = "") -> Iterator[VtuSeries]:
+    """VTU files in the folder ``NAME.vtu/`` beside the artifact, and a ``NAME.pvd``; tag : put behind NAME.
+
+    >>> with vtu_series("results/run.nc") as series:          # doctest: +SKIP
+    ...     series.add(0.0, points, {"triangle": triangles})
+
+    Leaving the block puts the files in place; leaving it by an exception leaves nothing.
+    """
+    artifact = Path(artifact)
+    folder, pvd = beside(artifact, tag + FOLDER), beside(artifact, tag + PVD)
+    with together():
+        with whole_file(folder) as building:
+            building.mkdir()
+            series = VtuSeries(building)
+            yield series
         rows = "".join(
-            f'    <DataSet timestep="{t!r}" part="0" file={quoteattr(f"{self.folder.name}/{i:04d}.vtu")}/>\n'
-            for i, t in enumerate(self._times)
+            f'    <DataSet timestep="{t!r}" part="0" file={quoteattr(f"{folder.name}/{i:04d}.vtu")}/>\n'
+            for i, t in enumerate(series.times)
         )
-        with whole_file(self.pvd) as temporary:
+        with whole_file(pvd) as temporary:
             temporary.write_text(
-                '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
+                f'<?xml version="1.0"?>\n{owner_mark(artifact)}\n'
+                '<VTKFile type="Collection" version="0.1" byte_order="LittleEndian">\n'
                 f"  <Collection>\n{rows}  </Collection>\n</VTKFile>\n",
                 encoding="utf-8",
             )
-        return self.pvd
-
-    def discard(self) -> None:
-        """Forget what was added, after a failure."""
-        shutil.rmtree(self._building, ignore_errors=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault, NumericsFailed, Refused
+from graben.errors import BadInput, Fault, MachineFailed, NumericsFailed, Refused
 from graben.mechanics.blocks import snapshot
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.history import History
@@ -19,7 +19,9 @@ from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.blocks.plastic_zones import Strength
 from graben.mechanics.blocks.tessellation import Tessellation, voronoi_blocks, without
 from graben.schemas.artifact import write_artifact
+from graben.schemas.files import together
 from graben.schemas.layouts.blocks import LAYOUT
+from graben.schemas.outputs import CHECKPOINT, PARTIAL, SERIES, Outputs, beside
 from graben.schemas.polygon_file import read_polygons
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.stages import blocks_checkpoint
@@ -39,6 +41,12 @@ _PACED = ("loading_steps", "force_check_worst", "force_check_mean")
 
 # Slivers of given or cut blocks are mended below this share of tessellation.edge.
 _MENDED = 0.1
+
+
+def outputs_of(scene: BlocksScene, output: Path) -> Outputs:
+    """What a run writes, and what it leaves when it stops."""
+    series = (*SERIES, *("-joints" + end for end in SERIES)) if scene.output.vtk else ()
+    return Outputs(output, series, kept=(CHECKPOINT, PARTIAL))
 
 
 def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Progress = silent) -> dict[str, Any]:
@@ -79,8 +87,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
     except (NumericsFailed, KeyboardInterrupt) as stop:
         keeper.stopped()
         if history.time and isinstance(stop, NumericsFailed):
-            partial = output.with_name(output.stem + ".partial.nc")
-            write_artifact(partial, LAYOUT, _arrays(model, history, test), record)
+            write_artifact(beside(output, PARTIAL), LAYOUT, _arrays(model, history, test), record)
         raise
     arrays = _arrays(model, history, test)
     headline = test.headline(arrays)
@@ -98,9 +105,14 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         **{name: headline[name] for name in (*test.ERRORS, *_PACED) if name in headline},
         **{f"block_{name}": value for name, value in tessellation.statistics().items()},
     }
-    write_artifact(output, LAYOUT, arrays, record)
-    if scene.output.vtk:
-        write_vtk(output, arrays)
+    try:
+        with together():
+            if scene.output.vtk:
+                write_vtk(output, arrays)
+            write_artifact(output, LAYOUT, arrays, record)
+    except (MachineFailed, KeyboardInterrupt):
+        keeper.stopped()
+        raise
     keeper.remove()
     return headline
 

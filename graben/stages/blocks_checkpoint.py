@@ -15,6 +15,7 @@ from graben.mechanics.blocks import snapshot
 from graben.mechanics.blocks.history import History
 from graben.mechanics.blocks.model import BlockModel
 from graben.schemas.files import whole_file
+from graben.schemas.outputs import CHECKPOINT, beside
 from graben.schemas.scene import Scene
 
 # Wall time between checkpoints on disk; a killed run loses no more than this and one saved state [s].
@@ -25,7 +26,7 @@ Arrays = dict[str, np.ndarray]
 
 def path_for(output: Path) -> Path:
     """Where the checkpoint of a run with this output lies."""
-    return output.with_name(output.stem + ".checkpoint.npz")
+    return beside(output, CHECKPOINT)
 
 
 @dataclass

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from graben.mechanics.blocks.bodies import ear_clip
-from graben.schemas.vtk import VtuSeries
+from graben.schemas.vtk import vtu_series
 
 # Of zones that can yield; in the files without "zone_".
 YIELD = ("zone_plastic_strain", "zone_state")
@@ -19,8 +19,7 @@ def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
     rigid = "block_stress" in arrays
     triangles, owner = _triangles(arrays) if rigid else (arrays["zone_vertex"], arrays["zone_block"])
     end = np.concatenate([[0], np.cumsum(arrays["contact_count"])])
-    beside = output.with_name(output.stem + "-joints.nc")
-    with VtuSeries(output) as zones, VtuSeries(beside) as joints:
+    with vtu_series(output) as zones, vtu_series(output, "-joints") as joints:
         for k, time in enumerate(arrays["time"]):
             removed = arrays["block_removed"][k] > 0 if "block_removed" in arrays else np.zeros(0, dtype=bool)
             there = ~removed[owner] if len(removed) else slice(None)

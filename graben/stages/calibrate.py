@@ -13,8 +13,9 @@ from graben.mechanics.search.curves import Curve
 from graben.mechanics.search.first_state import settle
 from graben.mechanics.search.identifiability import identify
 from graben.schemas.artifact import write_artifact
-from graben.schemas.files import refuse_existing
+from graben.schemas.files import together
 from graben.schemas.layouts.calibration import LAYOUT
+from graben.schemas.outputs import MATERIAL, STATE, Outputs, beside, files_of
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.material import material_text, write_material
@@ -93,7 +94,7 @@ def run(
 ) -> dict[str, Any]:
     """Fit the scene's law to its curves (or to the files `curves` instead); predict the curves of `validate`.
 
-    Writes `output` (kind "calibration") and `<output stem>.material.toml` beside it; returns the headline
+    Writes `output` (kind "calibration") and NAME.material.toml beside it; returns the headline
     numbers: rmse_pa, parameters (SI), per curve errors, what is not identifiable, validation_rmse_pa where
     asked.
 
@@ -101,7 +102,7 @@ def run(
     ----------
     compare : other calibrate scenes, whose laws are fitted to the same curves and cross-validated beside this one's
     cluster : address of a Dask scheduler whose workers take starts, or the particles of the asynchronous swarm
-    restart : go on from `<output stem>.state.npz`, which an interrupted run leaves; the result is that of a
+    restart : go on from NAME.state.npz, which an interrupted run leaves; the result is that of a
         straight run
 
     Raises
@@ -109,9 +110,10 @@ def run(
     BadInput : the scene or a curve has faults, or an output exists
     """
     scene: CalibrateScene = load_scene(scene_path, "calibrate", overrides)
-    material_path = output.with_suffix("").with_suffix(".material.toml")
-    refuse_existing(output, overwrite)
-    refuse_existing(material_path, overwrite)
+    outputs = Outputs(output, (MATERIAL,), kept=(STATE,))
+    read = [*files_of(scene), *curves, *validate, *compare]
+    outputs.claim(read, overwrite=overwrite, restart=restart)
+    material_path = beside(output, MATERIAL)
     # Processes and clusters share out whole candidates; threads within them would only quarrel.
     threads = scene.workers if scene.search != "appso" and cluster is None else 1
     prepared = prepare(scene, curves, validate, compare, threads)
@@ -122,7 +124,7 @@ def run(
     folds = scene.cross_validation or bool(others)
     share = 0.95 / (1 + folds + 2 * len(others))
     with workers_of(scene.search, scene.workers, problem.plan.particles, cluster) as workers:
-        state = State(output.with_suffix("").with_suffix(".state.npz"), digest_of(texts, sources), workers)
+        state = State(beside(output, STATE), digest_of(texts, sources), workers)
         if restart:
             state.load()
         objective, found = problem.solve(
@@ -166,8 +168,9 @@ def run(
         "search_ended": best.reason,
     }
     headline = headline_of(scene, problem, measured, unseen, values, known, errors, holdout, arrays, candidates)
-    write_artifact(output, LAYOUT, arrays, record, attributes)
-    write_material(material_path, scene.law, ordered, note)
+    with together():
+        write_material(material_path, scene.law, ordered, note)
+        write_artifact(output, LAYOUT, arrays, record, attributes)
     state.finish()
     progress(1.0, "done")
     return {**headline, "output": str(output), "material": str(material_path)}

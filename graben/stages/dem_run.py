@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from graben.errors import BadInput, Fault
-from graben.schemas.files import refuse_existing
+from graben.schemas.outputs import files_of
 from graben.schemas.scene import load_scene
 from graben.stages.record import Progress, silent
 
@@ -32,8 +32,8 @@ def run(
     NumericsFailed : the run had to stop; the last good state is kept beside the output
     """
     scene = load_scene(scene_path, ("blocks", "particles"), overrides)
-    refuse_existing(output, overwrite)
     stage = import_module(f"graben.stages.{scene.kind}")
+    stage.outputs_of(scene, output).claim(files_of(scene), overwrite=overwrite, restart=restart)
     if not restart:
         return stage.run(scene, output, progress=progress)
     if scene.kind != "blocks":

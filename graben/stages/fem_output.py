@@ -13,9 +13,10 @@ from graben.mechanics.continuum.march import March
 from graben.mechanics.continuum.newton import Step
 from graben.mechanics.continuum.surface import free_surface
 from graben.schemas.artifact import write_artifact
+from graben.schemas.files import together
 from graben.schemas.layouts.fem import LAYOUT
 from graben.schemas.scenes.fem import FemScene
-from graben.schemas.vtk import VtuSeries
+from graben.schemas.vtk import vtu_series
 from graben.stages.record import Record
 
 
@@ -137,18 +138,19 @@ def write_run(
         "compliance_ratio": headline["compliance_ratio"],
         "stiffness_ratio": headline["stiffness_ratio"],
     }
-    with VtuSeries(path) as series:
-        for k, time in enumerate(times):
-            fields = {
-                "stress": _six(stress[k]),
-                "strain": _six(strain[k]),
-                "mean_stress": stress[k, :, :3].mean(axis=1),
-                "von_mises_stress": von_mises(stress[k]),
-                "plastic_strain": plastic[k],
-                "damage": damage[k],
-            }
-            points = {"displacement": movement[k], "gravity_displacement": gravity}
-            series.add(time, mesh.points, {"quad": mesh.quads}, points, fields)
+    with together():
+        with vtu_series(path) as series:
+            for k, time in enumerate(times):
+                fields = {
+                    "stress": _six(stress[k]),
+                    "strain": _six(strain[k]),
+                    "mean_stress": stress[k, :, :3].mean(axis=1),
+                    "von_mises_stress": von_mises(stress[k]),
+                    "plastic_strain": plastic[k],
+                    "damage": damage[k],
+                }
+                points = {"displacement": movement[k], "gravity_displacement": gravity}
+                series.add(time, mesh.points, {"quad": mesh.quads}, points, fields)
         write_artifact(path, LAYOUT, arrays, record, attributes)
 
 

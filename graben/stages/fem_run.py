@@ -16,7 +16,7 @@ from graben.mechanics.continuum.mesh2d import QuadMesh
 from graben.mechanics.continuum.newton import NewtonOptions, Step
 from graben.mechanics.continuum.quads import body_force, edge_traction
 from graben.mechanics.continuum.stability import softest_stiffness
-from graben.schemas.files import refuse_existing
+from graben.schemas.outputs import LAST_GOOD, SERIES, Outputs, beside, files_of
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.fem import FemScene
 from graben.stages.estimate import Estimate, refuse_too_large
@@ -81,7 +81,9 @@ def run(
     NumericsFailed : no equilibrium under gravity, or before the end where the goal is the end
     """
     scene: FemScene = load_scene(scene_path, "fem", overrides)
-    refuse_existing(output, overwrite)
+    last_good = beside(output, LAST_GOOD + ".nc")
+    kept = (LAST_GOOD + ".nc", *(LAST_GOOD + end for end in SERIES))
+    Outputs(output, SERIES, kept=kept).claim([*files_of(scene), material], overwrite=overwrite)
     progress(0.0, "meshing")
     problem, inputs, _ = prepare(scene, material)
     record = Record.begin(scene, inputs)
@@ -91,7 +93,6 @@ def run(
     settled = march(body, body.untouched(), lambda t: t * problem.steady, 0.0, 1.0, _GRAVITY_STEPS, newton)
     settling = problem.unit_pressure / problem.loaded_length
     history = History(scene, settled, settling, problem.loaded_length, problem.offset)
-    last_good = output.with_name(f"{output.stem}.last-good{output.suffix}")
     if not settled.complete:
         headline = {"failed": True, "failure_load_pa": None, "compliance_ratio": 1.0, "stiffness_ratio": 1.0}
         partial = replace(problem, steady=settled.time * problem.steady)

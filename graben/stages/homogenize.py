@@ -12,9 +12,10 @@ from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.averaging.history import Average, average
 from graben.mechanics.averaging.rev import Circle, Polygon, Rev
 from graben.schemas.artifact import write_artifact
-from graben.schemas.files import refuse_existing
+from graben.schemas.files import together
 from graben.schemas.layouts.curves import LAYOUT
-from graben.schemas.vtk import VtuSeries
+from graben.schemas.outputs import SERIES, Outputs
+from graben.schemas.vtk import vtu_series
 from graben.stages.block_history import Run, read_run
 from graben.stages.record import Progress, Record, silent
 
@@ -76,9 +77,8 @@ def run(
     """
     if bool(radii) == bool(polygon):
         raise BadInput(Fault("homogenize", "--radius, --polygon", "", "either a radius or a polygon"))
-    for target in (output, steps_picture):
-        if target is not None:
-            refuse_existing(target, overwrite)
+    pictures = () if steps_picture is None else (steps_picture,)
+    Outputs(output, SERIES if vtk else (), others=pictures).claim(inputs, overwrite=overwrite)
     kinds = [_kind(path) for path in _existing(inputs)]
     if "particles" in kinds:
         return _spheres(inputs, kinds, output, radii, centre, deformed, chosen_at, steps_picture or vtk, progress)
@@ -106,13 +106,14 @@ def run(
         "outline_chosen_at": chosen_at,
         "stress_from": "zones, and the forces on blocks without zones" if rigid else "zones",
     }
-    write_artifact(output, LAYOUT, arrays, record, attributes)
-    if steps_picture is not None:
-        from graben.stages.show.outline_steps import save_steps
+    with together():
+        if steps_picture is not None:
+            from graben.stages.show.outline_steps import save_steps
 
-        save_steps(steps_picture, jobs[0][0].history, averages[0].outline, jobs[0][1])
-    if vtk:
-        _write_vtk(output, jobs, averages)
+            save_steps(steps_picture, jobs[0][0].history, averages[0].outline, jobs[0][1])
+        if vtk:
+            _write_vtk(output, jobs, averages)
+        write_artifact(output, LAYOUT, arrays, record, attributes)
     return {"paths": [_headline(str(arrays["path_name"][k]), j, a) for k, (j, a) in enumerate(zip(jobs, averages))]}
 
 
@@ -244,7 +245,7 @@ def _write_vtk(output: Path, jobs: Sequence[tuple[Run, Rev]], averages: Sequence
         ]
     )
     longest = max(range(len(jobs)), key=lambda k: moving[k].shape[0])
-    with VtuSeries(output) as series:
+    with vtu_series(output) as series:
         for step, time in enumerate(jobs[longest][0].history.time):
             # A run that ended earlier keeps its last state.
             now = [min(step, nodes.shape[0] - 1) for nodes in moving]

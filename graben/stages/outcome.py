@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from graben.errors import BadInput, NotFinite, NumericsFailed
+import errno
 
-DONE, BAD_INPUT, NUMERICS, INTERRUPTED = 0, 2, 3, 130
+from graben.errors import BadInput, MachineFailed, NotFinite, NumericsFailed
+
+DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
+# What the operating system says when the machine is at fault, not the program.
+_MACHINE = {
+    errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM,
+    errno.ESTALE,
+}  # fmt: skip
 
 
 def explain(error: BaseException) -> tuple[int, list[str]] | None:
@@ -12,7 +19,13 @@ def explain(error: BaseException) -> tuple[int, list[str]] | None:
     if isinstance(error, BadInput):
         return BAD_INPUT, [str(fault) for fault in error.faults]
     if isinstance(error, NumericsFailed | NotFinite):
-        return NUMERICS, [f"the numerics failed: {error}"]
+        return FAILED, [f"the numerics failed: {error}"]
+    if isinstance(error, MachineFailed):
+        return FAILED, [str(error)]
+    if isinstance(error, MemoryError):
+        return FAILED, [f"not enough memory: {error}".rstrip(": ")]
+    if isinstance(error, OSError) and error.errno in _MACHINE:
+        return FAILED, [f"the machine failed: {error}"]
     if isinstance(error, KeyboardInterrupt):
         return INTERRUPTED, ["interrupted; no output was written"]
     return None

@@ -23,9 +23,11 @@ from graben.mechanics.particles.bed import (
 from graben.mechanics.particles.law import LinearLaw, critical_step
 from graben.mechanics.particles.sampling import interval_over_areas, interval_over_beds
 from graben.schemas.artifact import write_artifact
+from graben.schemas.files import together
 from graben.schemas.layouts.particles import LAYOUT
+from graben.schemas.outputs import LAST_GOOD, SERIES, Outputs, beside
 from graben.schemas.scenes.particles import ParticlesScene
-from graben.schemas.vtk import VtuSeries, write_vtu
+from graben.schemas.vtk import vtu_series, write_vtu
 from graben.stages.estimate import Estimate, refuse_too_large, work
 from graben.stages.record import Progress, Record, silent
 
@@ -33,6 +35,11 @@ from graben.stages.record import Progress, Record, silent
 FIDELITY = {"draft": (0.6, 1e-2, 5e-3), "standard": (0.4, 1e-3, 1e-3), "reference": (0.2, 1e-4, 1e-4)}
 
 _GRAIN_BYTES = 4000.0  # states, contacts and their histories
+
+
+def outputs_of(scene: ParticlesScene, output: Path) -> Outputs:
+    """What a run writes, and what it leaves when it fails."""
+    return Outputs(output, SERIES if scene.output.vtk else (), kept=(LAST_GOOD + ".vtu",))
 
 
 def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> dict[str, Any]:
@@ -71,9 +78,10 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
         "unbalanced_force_ratio": max(b.survey.unbalanced for b in beds),
         "largest_overlap_over_radius": max(b.survey.overlap for b in beds),
     }
-    write_artifact(output, LAYOUT, arrays, record)
-    if scene.output.vtk:
-        _write_vtk(output, law, beds[0])
+    with together():
+        if scene.output.vtk:
+            _write_vtk(output, law, beds[0])
+        write_artifact(output, LAYOUT, arrays, record)
     classes = [
         {
             "name": g.name,
@@ -260,7 +268,7 @@ def _arrays(scene: ParticlesScene, law: LinearLaw, beds: list[Bed]) -> dict[str,
 
 
 def _write_last_good(output: Path, state: Snapshot) -> Path:
-    path = output.with_name(f"{output.stem}.last-good.vtu")
+    path = beside(output, LAST_GOOD + ".vtu")
     data = {"radius": state.radius, "class": state.kind, "velocity": state.velocity}
     write_vtu(path, state.position, {"vertex": np.arange(len(state.radius))[:, None]}, data)
     return path
@@ -268,7 +276,7 @@ def _write_last_good(output: Path, state: Snapshot) -> Path:
 
 def _write_vtk(output: Path, law: LinearLaw, bed: Bed) -> None:
     """Spheres as points with a radius (glyph them in ParaView), one file per phase; forces for the last."""
-    with VtuSeries(output) as series:
+    with vtu_series(output) as series:
         cells = {"vertex": np.arange(len(bed.radius))[:, None]}
         last = list(bed.states)[-1]
         for name, position in bed.states.items():

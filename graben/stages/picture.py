@@ -7,8 +7,9 @@ from pathlib import Path
 
 from graben.errors import BadInput, Fault
 from graben.schemas.artifact import read_artifact
-from graben.schemas.files import refuse_existing, whole_file
+from graben.schemas.files import whole_file
 from graben.schemas.kinds import LAYOUTS
+from graben.schemas.outputs import Outputs
 
 FORMATS = (".png", ".pdf", ".svg")
 
@@ -22,7 +23,7 @@ def run(artifact: Path, output: Path, *, overwrite: bool = False) -> None:
     """
     if output.suffix not in FORMATS:
         raise BadInput(Fault(str(output), "", "", "a picture name ending in " + ", ".join(FORMATS)))
-    refuse_existing(output, overwrite)
+    Outputs(output).claim([artifact], overwrite=overwrite)
     dataset = read_artifact(artifact, LAYOUTS)
     import matplotlib
 

@@ -11,8 +11,9 @@ from typing import Any
 
 from graben.errors import BadInput, Fault
 from graben.schemas.artifact import read_artifact
-from graben.schemas.files import refuse_existing, whole_file
+from graben.schemas.files import whole_file
 from graben.schemas.kinds import LAYOUTS
+from graben.schemas.outputs import Outputs
 from graben.stages import picture
 from graben.stages.record import Progress, silent
 
@@ -33,8 +34,8 @@ def run(folder: Path, output: Path, *, overwrite: bool = False, progress: Progre
     """
     if output.suffix not in (".html", ".htm"):
         raise BadInput(Fault(str(output), "", "", "a page name ending in .html"))
-    refuse_existing(output, overwrite)
     artifacts = sorted(folder.glob("*.nc"))
+    Outputs(output).claim(artifacts, overwrite=overwrite)
     if not artifacts:
         raise BadInput(Fault(str(folder), "", "", "a folder with artifacts (*.nc)"))
     sections = []

@@ -21,8 +21,8 @@ from graben.mechanics.averaging.representative import (
 )
 from graben.mechanics.averaging.rev import Circle
 from graben.schemas.artifact import write_artifact
-from graben.schemas.files import refuse_existing
 from graben.schemas.layouts.rev_study import LAYOUT
+from graben.schemas.outputs import Outputs, files_of
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.rev_study import RevStudyScene
@@ -91,8 +91,9 @@ def run(
     ------
     BadInput : faults of the inputs, a REV outside a model, runs at different lateral stress, an output that exists
     """
-    refuse_existing(output, overwrite)
     law, _ = prepare(scene, len(inputs))
+    read = files_of(scene) + (files_of(law) if law is not None else [])
+    Outputs(output).claim([*inputs, *read], overwrite=overwrite)
     runs = _read(inputs, scene, progress)
     groups = _realizations(runs)
     record = Record.begin(scene, inputs=[*inputs, *([law.source.path] if law else [])])

@@ -14,7 +14,7 @@ from graben.mechanics.continuum.scratch import run as mechanics
 from graben.mechanics.continuum.scratch.mesh import HexMesh, cells_along, specimen
 from graben.mechanics.materials.law import Law
 from graben.mechanics.materials.laws import LAWS
-from graben.schemas.files import refuse_existing
+from graben.schemas.outputs import LAST_GOOD, SERIES, Outputs, files_of
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.scratch import ScratchScene
 from graben.stages.estimate import Estimate, refuse_too_large, work
@@ -56,7 +56,8 @@ def run(
     NumericsFailed : energy, volume or mass error beyond the scene's limits; the last good state is kept as VTU
     """
     scene: ScratchScene = load_scene(scene_path, "scratch", overrides)
-    refuse_existing(output, overwrite)
+    outputs = Outputs(output, SERIES, kept=(LAST_GOOD + ".vtu",))
+    outputs.claim([*files_of(scene), material], overwrite=overwrite)
     law, par, inputs, _ = prepare(scene, material)
     record = Record.begin(scene, inputs)
     mesh = mesh_of(scene)

@@ -12,9 +12,11 @@ from graben.mechanics.continuum.scratch.mesh import HexMesh
 from graben.mechanics.continuum.scratch.run import ENERGIES, ScratchRun, Snapshot
 from graben.mechanics.wear.groove import Section, VolumeLedger, cut, measure, volume_ledger
 from graben.schemas.artifact import write_artifact
+from graben.schemas.files import together
 from graben.schemas.layouts.scratch import LAYOUT
+from graben.schemas.outputs import LAST_GOOD, beside
 from graben.schemas.scenes.scratch import ScratchScene
-from graben.schemas.vtk import VtuSeries, write_vtu
+from graben.schemas.vtk import vtu_series, write_vtu
 from graben.stages.record import Record
 
 _STATES = ("loaded", "unloaded")
@@ -125,11 +127,7 @@ def _headline(
 def write_run(
     output: Path, record: Record, scene: ScratchScene, mesh: HexMesh, result: ScratchRun, groove: Groove
 ) -> None:
-    """Write the artifact, and the VTU series before it (so that the artifact stands for a whole result)."""
-    with VtuSeries(output) as series:
-        for frame in result.frames:
-            points, cells, point_data, cell_data = fields(mesh, frame)
-            series.add(frame.time, points, cells, point_data, cell_data)
+    """Write the artifact and the VTU series beside it."""
     head = groove.headline
     arrays: dict[str, Any] = {
         "groove_area": head["groove_area_m2"],
@@ -166,12 +164,16 @@ def write_run(
         },
         "largest_plastic_strain": float(result.unloaded.plastic_strain.max()),
     }
-    write_artifact(output, LAYOUT, arrays, record)
+    with together():
+        with vtu_series(output) as series:
+            for frame in result.frames:
+                series.add(frame.time, *fields(mesh, frame))
+        write_artifact(output, LAYOUT, arrays, record)
 
 
 def write_last_good(output: Path, mesh: HexMesh, frame: Snapshot) -> Path:
     """The last good state of a run that failed, as one VTU beside where the artifact would have been."""
-    path = output.with_name(f"{output.stem}.last-good.vtu")
+    path = beside(output, LAST_GOOD + ".vtu")
     write_vtu(path, *fields(mesh, frame))
     return path
 

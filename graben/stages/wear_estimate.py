@@ -13,8 +13,8 @@ from graben.errors import BadInput, Fault, Incomplete, Refused
 from graben.mechanics.wear.counts import contacts_per_area, doubts
 from graben.mechanics.wear.rate import GrooveTable, balanced_forces, carried_load, wear_rates
 from graben.schemas.artifact import read_artifact, write_artifact
-from graben.schemas.files import refuse_existing
 from graben.schemas.layouts.wear import LAYOUT
+from graben.schemas.outputs import Outputs, files_of
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.wear import Mixture, WearScene
 from graben.stages.record import Progress, Record, silent
@@ -65,7 +65,8 @@ def run(
     BadInput : every fault of scene and artifacts at once, or the output exists
     """
     scene: WearScene = load_scene(scene_path, "wear", overrides)
-    refuse_existing(output, overwrite)
+    scratch = {name: list(paths) for name, paths in (scratch or {}).items()}
+    Outputs(output).claim([*files_of(scene), bed, *sum(scratch.values(), [])], overwrite=overwrite)
     prepared = prepare(scene, bed, scratch)
     record = Record.begin(scene, prepared.inputs)
     rows = prepared.rows

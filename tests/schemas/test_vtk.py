@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from graben.schemas.vtk import VtuSeries, write_vtu
+from graben.schemas.vtk import vtu_series, write_vtu
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -23,20 +23,20 @@ def test_a_vtu_opens_in_vtk_with_its_fields(tmp_path):
 def test_a_series_puts_states_on_a_time_axis(tmp_path):
     import pyvista
 
-    series = VtuSeries(tmp_path / "run.nc")
-    for time in (0.0, 0.5):
-        series.add(time, SQUARE, {"quad": np.array([[0, 1, 2, 3]])}, cell_data={"t": np.array([time])})
-    assert not (tmp_path / "run.vtu").exists()
-    reader = pyvista.get_reader(series.close())
+    with vtu_series(tmp_path / "run.nc") as series:
+        for time in (0.0, 0.5):
+            series.add(time, SQUARE, {"quad": np.array([[0, 1, 2, 3]])}, cell_data={"t": np.array([time])})
+        assert not (tmp_path / "run.vtu").exists()
+    reader = pyvista.get_reader(tmp_path / "run.pvd")
     assert reader.time_values == [0.0, 0.5]
     reader.set_active_time_value(0.5)
     assert reader.read()[0].cell_data["t"][0] == 0.5
 
 
 def test_a_discarded_series_leaves_nothing(tmp_path):
-    series = VtuSeries(tmp_path / "run.nc")
-    series.add(0.0, SQUARE, {"quad": np.array([[0, 1, 2, 3]])})
-    series.discard()
+    with pytest.raises(ZeroDivisionError), vtu_series(tmp_path / "run.nc") as series:
+        series.add(0.0, SQUARE, {"quad": np.array([[0, 1, 2, 3]])})
+        raise ZeroDivisionError
     assert list(tmp_path.iterdir()) == []
 
 

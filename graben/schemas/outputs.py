@@ -1,0 +1,254 @@
+"""Every path that a run will write, derived once from the name of its artifact and checked before the run."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import tempfile
+import tomllib
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from graben.errors import BadInput, Fault
+from graben.schemas.files import existing_folder, machine, part_of, recover
+
+# What is beside an artifact NAME.nc, by the end of its name.
+FOLDER, PVD, MATERIAL = ".vtu", ".pvd", ".material.toml"
+CHECKPOINT, STATE, PARTIAL, LAST_GOOD = ".checkpoint.npz", ".state.npz", ".partial.nc", ".last-good"
+
+SERIES = (FOLDER, PVD)
+
+_ROOM = 100_000  # bytes that must be free before a run starts
+_RESERVED = (".partial", LAST_GOOD)
+
+
+def name_of(output: Path) -> str:
+    """NAME of an output: its file name without a final ".nc", otherwise whole."""
+    return output.name.removesuffix(".nc") or output.name
+
+
+def beside(output: Path, end: str) -> Path:
+    """NAME + end in the folder of the output."""
+    return output.with_name(name_of(output) + end)
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """The paths of one run.
+
+    Attributes
+    ----------
+    main : the artifact, picture or page; it is put in place last
+    ends : of the names of what is written beside it
+    kept : the same, of what a run that is stopped or fails leaves behind
+    others : further files, named by the user
+    """
+
+    main: Path
+    ends: tuple[str, ...] = ()
+    kept: tuple[str, ...] = ()
+    others: tuple[Path, ...] = ()
+    _kept: frozenset[Path] = field(init=False, default=frozenset())
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_kept", frozenset(beside(self.main, e) for e in self.kept))
+
+    def paths(self) -> list[Path]:
+        """All of them, the main one first."""
+        return [self.main, *(beside(self.main, end) for end in (*self.ends, *self.kept)), *self.others]
+
+    def claim(self, inputs: Iterable[Path | None], *, overwrite: bool = False, restart: bool = False) -> None:
+        """Check that every output may and can be written; clean up what a killed run left of them.
+
+        Parameters
+        ----------
+        inputs : what the run reads, which must outlive it; None counts for nothing
+        overwrite : what graben wrote earlier may be replaced
+        restart : what a stopped run kept may be replaced
+
+        Raises
+        ------
+        BadInput : every output that lies on an input or on another output, that exists and may not be replaced, or
+            that is no name for a regular file
+        MachineFailed : a folder that cannot be written, or a full disk
+        """
+        paths = self.paths()
+        if self.main.name in ("", ".."):
+            raise BadInput(Fault(str(self.main), "", "", "a file name for the output, not a folder"))
+        recover(paths[1:], self.main)
+        faults = list(self._clashes([p for p in inputs if p is not None]))
+        taken = {Path(f.file) for f in faults}
+        for path in paths:
+            if path not in taken:
+                faults += self._faults_of(path, overwrite or (restart and path in self._kept))
+        faults += self._twin()
+        if faults:
+            raise BadInput(faults)
+        for path in {p.parent.absolute(): p for p in paths}.values():
+            _try_to_write(path)
+
+    def _clashes(self, inputs: list[Path]) -> Iterator[Fault]:
+        paths = self.paths()
+        for k, path in enumerate(paths):
+            for other in inputs:
+                if _same(path, other) or _within(other, path):
+                    yield Fault(str(path), "", "", f"another name: the run would write over its input {other}")
+                    break
+            else:
+                earlier = [p for p in paths[:k] if _same(path, p) or _within(path, p) or _within(p, path)]
+                if earlier:
+                    yield Fault(str(path), "", "", f"another name than that of the output {earlier[0]}")
+        if name_of(self.main).endswith(_RESERVED) and self.main.suffix == ".nc":
+            yield Fault(str(self.main), "", "", "another name: runs that fail leave files of such names")
+
+    def _faults_of(self, path: Path, may_replace: bool) -> Iterator[Fault]:
+        try:
+            found = path.lstat()
+        except FileNotFoundError:
+            return
+        except (OSError, ValueError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            yield Fault(str(path), "", "", f"a name under which a file can be written ({reason})")
+            return
+        folder = stat.S_ISDIR(found.st_mode)
+        if folder and path == self.main:
+            yield Fault(str(path), "", "", "a file name for the output, not a folder")
+        elif not (folder or stat.S_ISREG(found.st_mode)):
+            yield Fault(str(path), "", "", f"a regular file or a free name, not a {_what(found.st_mode)}")
+        elif not may_replace:
+            ways = "--restart or --overwrite" if path in self._kept and path.suffix == ".npz" else "--overwrite"
+            yield Fault(str(path), "", "", f"an output that does not exist yet (or {ways})")
+        elif not self._ours(path):
+            yield Fault(str(path), "", "", "a file that graben wrote, to replace it: move away what lies there")
+
+    def _ours(self, path: Path) -> bool:
+        """Whether graben wrote what lies there, so that --overwrite may replace it."""
+        with suppress(OSError, ValueError, KeyError, RuntimeError):
+            if path.suffix == FOLDER and path.is_dir():
+                return all(re.fullmatch(r"\d{4,}\.vtu", p.name) and p.is_file() for p in path.iterdir())
+            if path.is_file():
+                return path.stat().st_size == 0 or _MARKS.get(path.suffix, _artifact)(path, self.main)
+        return False
+
+    def _twin(self) -> Iterator[Fault]:
+        """Outputs "a" and "a.nc" would share what lies beside them."""
+        name = self.main.name
+        other = self.main.with_name(name.removesuffix(".nc") if name.endswith(".nc") else name + ".nc")
+        if (self.ends or self.kept) and other != self.main and other.is_file() and _artifact(other, self.main):
+            yield Fault(str(self.main), "", "", f"another name: files beside it would be those of {other.name}")
+
+
+def files_of(scene: Any) -> list[Path]:
+    """The scene's own file and every file that it names."""
+    from pydantic import BaseModel
+
+    def walk(value: Any) -> Iterator[Path]:
+        if isinstance(value, Path):
+            yield value
+        elif isinstance(value, BaseModel):
+            for name in type(value).model_fields:
+                yield from walk(getattr(value, name))
+        elif isinstance(value, dict):
+            yield from walk(list(value.values()))
+        elif isinstance(value, list | tuple):
+            for part in value:
+                yield from walk(part)
+
+    return [scene.source.path, *walk(scene)]
+
+
+def _try_to_write(path: Path) -> None:
+    """Raise what stands against a file there; nothing is left, not even a folder."""
+    folder = existing_folder(path)
+    between = path.absolute()
+    for name in (*between.relative_to(folder).parts[:-1], part_of(path).name):
+        if len(os.fsencode(name)) > 255:
+            raise BadInput(Fault(str(path), "", "", f"a shorter name ({len(os.fsencode(path.name))} bytes)"))
+    above = between.parent
+    while above != folder:
+        if os.path.lexists(above):
+            raise BadInput(Fault(str(path), "", "", f"a folder to write to; {above} is none"))
+        above = above.parent
+    with machine(path), tempfile.NamedTemporaryFile(dir=folder, prefix=".", suffix=".part") as probe:
+        probe.write(bytes(_ROOM))
+        probe.flush()
+
+
+def _same(a: Path, b: Path) -> bool:
+    with suppress(OSError):
+        if a.samefile(b):
+            return True
+    a, b = a.resolve(), b.resolve()
+    return a == b or (a.parent == b.parent and a.name.casefold() == b.name.casefold() and not a.exists())
+
+
+def _within(path: Path, folder: Path) -> bool:
+    """Whether `path` lies in the folder of VTU files that will be at `folder`."""
+    return folder.suffix == FOLDER and folder.resolve() in path.resolve().parents
+
+
+def _what(mode: int) -> str:
+    kinds: list[tuple[Callable[[int], bool], str]] = [
+        (stat.S_ISLNK, "symbolic link"), (stat.S_ISFIFO, "named pipe"), (stat.S_ISSOCK, "socket"),
+    ]  # fmt: skip
+    return next((words for test, words in kinds if test(mode)), "device")
+
+
+def _artifact(path: Path, main: Path) -> bool:
+    import netCDF4
+
+    with open(path, "rb") as stream:
+        if stream.read(4) != b"\x89HDF":
+            return False
+    with netCDF4.Dataset(path) as data:
+        return getattr(data, "software", "") == "graben" or "schema_kind" in data.ncattrs()
+
+
+def _text(pattern: str) -> Callable[[Path, Path], bool]:
+    def test(path: Path, main: Path) -> bool:
+        return re.search(pattern.encode(), path.read_bytes()) is not None
+
+    return test
+
+
+def _pvd(path: Path, main: Path) -> bool:
+    """A PVD of this artifact: -joints.pvd of one run and the .pvd of another called NAME-joints have one name."""
+    return owner_mark(main) in path.read_text(encoding="utf-8")
+
+
+def owner_mark(output: Path) -> str:
+    """A comment by which a PVD names the artifact that it belongs to."""
+    return f"<!-- graben: fields of {output.name.replace('--', '- -')} -->"
+
+
+def _material(path: Path, main: Path) -> bool:
+    text = path.read_text(encoding="utf-8")
+    return text.startswith("#") and set(tomllib.loads(text)) == {"law", "parameters"} and "# fitted to" in text
+
+
+def _npz(path: Path, main: Path) -> bool:
+    """A checkpoint or state, even a damaged one: its members are named in the headers and again at the end."""
+    with open(path, "rb") as stream:
+        text = stream.read(1000)
+        stream.seek(max(0, path.stat().st_size - 100_000))
+        text += stream.read()
+    return text.startswith(b"PK") and (b"scene.npy" in text or b"digest.npy" in text)
+
+
+_PICTURE = _text("[Mm]atplotlib")
+# By the end of the name; anything else is an artifact.
+_MARKS: dict[str, Callable[[Path, Path], bool]] = {
+    FOLDER: _text("UnstructuredGrid"),
+    PVD: _pvd,
+    ".toml": _material,
+    ".npz": _npz,
+    ".png": _PICTURE,
+    ".pdf": _PICTURE,
+    ".svg": _PICTURE,
+    ".html": _text("<title>graben: "),
+    ".htm": _text("<title>graben: "),
+}
