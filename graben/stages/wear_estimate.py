@@ -66,7 +66,8 @@ def run(
     """
     scene: WearScene = load_scene(scene_path, "wear", overrides)
     scratch = {name: list(paths) for name, paths in (scratch or {}).items()}
-    Outputs(output).claim([*files_of(scene), bed, *sum(scratch.values(), [])], overwrite=overwrite)
+    grooves = [path for paths in scratch.values() for path in paths]
+    Outputs(output).claim([*files_of(scene), bed, *grooves], overwrite=overwrite)
     prepared = prepare(scene, bed, scratch)
     record = Record.begin(scene, prepared.inputs)
     rows = prepared.rows
