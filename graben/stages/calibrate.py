@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +27,7 @@ from graben.stages.calibrate_problem import Problem, problem_of, sizes_of
 from graben.stages.calibrate_state import State, digest_of
 from graben.stages.calibrate_workers import workers_of
 from graben.stages.estimate import Estimate, refuse_too_large
-from graben.stages.measured import Reading, read_measured
+from graben.stages.measured import Reading, read_files
 from graben.stages.record import Progress, Record, silent
 
 _NEAR = 1.1  # members of the ensemble: objective up to this multiple of the best
@@ -34,13 +35,15 @@ _NEAR = 1.1  # members of the ensemble: objective up to this multiple of the bes
 
 @dataclass(frozen=True)
 class Prepared:
-    """A checked scene whose search has not begun: files of curves, its problem and those of rivals, curves, sizes."""
+    """A checked scene whose search has not begun: files of curves, its problem and those of rivals, curves,
+    how each file was read, sizes."""
 
     sources: list[Path]
     problem: Problem
     others: list[Problem]
     measured: list[Curve]
     unseen: list[Curve]
+    read: dict[str, Any]
     sizes: list[Estimate]
 
 
@@ -65,10 +68,10 @@ def prepare(
     if not sources:
         expected = "at least one file of curves, here or on the command line"
         raise Incomplete(Fault(str(file), "curves", "[]", expected))
-    reading = Reading(scene.test, scene.csv.sign, scene.csv.allow_tension)
-    every = read_measured([*sources, *validate], reading)
-    unseen = read_measured(validate, reading) if validate else []
-    measured = every[: len(every) - len(unseen)]
+    reading = Reading(scene.test, scene.csv.sign, scene.csv.allow_tension, scene.csv.allow_narrowing)
+    files = read_files([*sources, *validate], reading)
+    measured = [curve for part in files[: len(sources)] for curve in part.curves]
+    unseen = [curve for part in files[len(sources) :] for curve in part.curves]
     sizes = sizes_of(problem, len(others), measured)
     refuse_too_large(file, sizes)
     for p in (problem, *others):
@@ -76,7 +79,8 @@ def prepare(
             p.check(measured)
         except Refused as error:
             raise BadInput(Fault(str(p.scene.source.path), "", "", f"a law that can be fitted ({error})")) from error
-    return Prepared(sources, problem, others, measured, unseen, sizes)
+    read = {part.file: part.read for part in files}
+    return Prepared(sources, problem, others, measured, unseen, read, sizes)
 
 
 def run(
@@ -96,7 +100,7 @@ def run(
 
     Writes `output` (kind "calibration") and NAME.material.toml beside it; returns the headline
     numbers: rmse_pa, parameters (SI), per curve errors, what is not identifiable, validation_rmse_pa where
-    asked.
+    asked, and `read`: how each file was read.
 
     Parameters
     ----------
@@ -166,6 +170,7 @@ def run(
         "rmse_pa": errors["stress"],
         "objective": best.value,
         "search_ended": best.reason,
+        "read": json.dumps(prepared.read),
     }
     headline = headline_of(scene, problem, measured, unseen, values, known, errors, holdout, arrays, candidates)
     with together():
@@ -173,4 +178,4 @@ def run(
         write_artifact(output, LAYOUT, arrays, record, attributes)
     state.finish()
     progress(1.0, "done")
-    return {**headline, "output": str(output), "material": str(material_path)}
+    return {**headline, "read": prepared.read, "output": str(output), "material": str(material_path)}

@@ -36,6 +36,9 @@ class CsvFormat(Model):
         "tension-positive", "sign of stresses and strains in the file; a confining stress may have either"
     )
     allow_tension: Switch = key(False, "accept curves that pull; otherwise they are taken for a wrong sign")
+    allow_narrowing: Switch = key(
+        False, "accept specimens that contract laterally while they shorten; otherwise the sign is taken for wrong"
+    )
 
 
 class WeightTable(Model):
