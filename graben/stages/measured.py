@@ -22,6 +22,7 @@ _log = logging.getLogger(__name__)
 
 # control and seating by kind of test: lateral stress and axial strain prescribed
 _TESTS = {"plane-strain": ("seee", "ssee", (1,)), "triaxial": ("sese", "ssse", (1,))}
+_ONE_LATERAL = 0.1  # of the largest stress: further apart, two lateral stresses are not one
 _HOLES = 0.1  # of a test's rows may lack a number
 _UNIT = 0.5  # a strain without a unit that reaches this may be in percent
 _LOADED = 0.1  # of a curve's largest deviator, where it begins: worth a word
@@ -91,10 +92,11 @@ def _told_apart(found: list[Measured]) -> list[Measured]:
 def _curve(name: str, stress: np.ndarray, strain: np.ndarray, test: str) -> Curve:
     control, seat, compared = _TESTS[test]
     stress, strain = stress.copy(), strain.copy()
-    if test == "triaxial":
-        missing = np.isnan(stress[:, 2])
-        stress[missing, 2] = stress[missing, 0]
-    strain[:, 2:] = np.where(np.isnan(strain[:, 2:]) | (test == "plane-strain"), 0.0, strain[:, 2:])
+    if test == "triaxial":  # one lateral stress: scatter between its two readings would choose where an edge flows to
+        other = np.where(np.isnan(stress[:, 2]), stress[:, 0], stress[:, 2])
+        stress[:, 0] = stress[:, 2] = 0.5 * (stress[:, 0] + other)
+    strain[:, 2] = np.where(np.isnan(strain[:, 2]) | (test == "plane-strain"), 0.0, strain[:, 2])
+    strain[:, 3] = 0.0  # xx and yy are principal axes
     return Curve(name, stress, strain, control=control, seat=seat, fit_stress=compared, fit_strain=(0,))
 
 
@@ -123,6 +125,11 @@ def _check(path: Path, name: str, rows: list[str], time: np.ndarray, stress: np.
     if np.nanmax(np.abs(strain)) > 2.0:
         found = f"up to {np.nanmax(np.abs(strain)):g}"
         faults.append(Fault(file, f"curve {name}, strain", found, "strain as a fraction, not percent"))
+    apart = np.abs(stress[:, 2] - stress[:, 0])
+    if reading.test == "triaxial" and np.nanmax(apart, initial=0.0) > _ONE_LATERAL * np.nanmax(np.abs(stress[:, :3])):
+        i = int(np.nanargmax(apart))
+        where, found = f"curve {name}, {rows[i]}, stress_zz", f"{stress[i, 2]:.4g} Pa beside {stress[i, 0]:.4g} Pa"
+        faults.append(Fault(file, where, found, "the lateral stress, as stress_xx: the test is triaxial"))
     lateral, axial = float(np.mean(stress[:, 0])), stress[np.abs(stress[:, 1]).argmax(), 1]
     pulls = lateral > 1e-3 * abs(axial) or (axial > 0.0 and strain[-1, 1] > 0.0)
     if pulls and not reading.allow_tension:

@@ -45,6 +45,18 @@ def test_a_triaxial_test_takes_the_lateral_stress_for_both_axes(tmp_path):
     assert curve.control == "sese" and (curve.stress[:, 2] == curve.stress[:, 0]).all()
 
 
+def test_two_readings_of_the_lateral_stress_are_one_in_a_triaxial_test(tmp_path):
+    path = tmp_path / "both.csv"
+    head = "time_s,stress_xx_pa,stress_yy_pa,stress_zz_pa,strain_xx,strain_yy\n"
+    path.write_text(head + "0,-5e5,-5e5,-5.02e5,0,0\n1,-5e5,-1e6,-4.96e5,1e-4,-1e-3\n")
+    (curve,) = read_measured([path], Reading(test="triaxial"))
+    np.testing.assert_allclose(curve.stress[:, [0, 2]], [[-5.01e5] * 2, [-4.98e5] * 2])
+    path.write_text(head + "0,-5e5,-5e5,-5e5,0,0\n1,-5e5,-1e6,-2e5,1e-4,-1e-3\n")
+    with pytest.raises(BadInput, match=r"row 3, stress_zz = -2e\+05 Pa beside -5e\+05 Pa"):
+        read_measured([path], Reading(test="triaxial"))
+    read_measured([path], Reading())
+
+
 @pytest.mark.parametrize(
     ("rows", "texts"),
     [

@@ -92,6 +92,12 @@ def prepare(law_id, par):
         prepare_transverse(par)
 
 
+@kernel(error_model="numpy")
+def isotropic(law_id):
+    """Whether the law of that id knows no direction; one that does is named here."""
+    return law_id != 6
+
+
 def find(name: str) -> Law:
     """The law of that name; ValueError that lists the known ones."""
     if name not in LAWS:

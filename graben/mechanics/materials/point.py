@@ -4,6 +4,8 @@ Each component is under strain control or stress control. An increment prescribe
 quantity; the strains under stress control follow by Newton with the law's own tangent. An increment that does
 not converge is halved, down to a smallest one; where that fails too the path has no solution there (a damaged
 point cannot carry the prescribed stress): the driver stops, keeps what it reached and says how far it came.
+
+Axes under one and the same stress may share one strain, see `unknowns.py`.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from numpy.typing import NDArray
 from graben.mechanics.compiled import kernel
 from graben.mechanics.materials.law import OK
 from graben.mechanics.materials.laws import find, update
+from graben.mechanics.materials.unknowns import equations, level, number_unknowns, solve_small
 
 SMALLEST = 2.0**-12  # of an increment; below it the path counts as without solution
 _NEWTON = 12
@@ -23,121 +26,82 @@ _BRACKETED = 40
 
 
 @kernel(error_model="numpy")
-def solve_small(a, b, m):
-    """Solve a[:m, :m] x = b[:m] by elimination with pivoting, x into b. False when singular."""
-    if m == 1:  # a test under one constant lateral stress, which most paths are
-        if a[0, 0] == 0.0:
-            return False
-        b[0] /= a[0, 0]
-        return abs(b[0]) < 1e100
-    for i in range(m):
-        pivot = i
-        for r in range(i + 1, m):
-            if abs(a[r, i]) > abs(a[pivot, i]):
-                pivot = r
-        if not abs(a[pivot, i]) > 0.0:
-            return False
-        if pivot != i:
-            for c in range(i, m):
-                a[i, c], a[pivot, c] = a[pivot, c], a[i, c]
-            b[i], b[pivot] = b[pivot], b[i]
-        for r in range(i + 1, m):
-            ratio = a[r, i] / a[i, i]
-            if ratio != 0.0:
-                for c in range(i, m):
-                    a[r, c] -= ratio * a[i, c]
-                b[r] -= ratio * b[i]
-    for i in range(m - 1, -1, -1):
-        for c in range(i + 1, m):
-            b[i] -= a[i, c] * b[c]
-        b[i] /= a[i, i]
-        if not abs(b[i]) < 1e100:
-            return False
-    return True
-
-
-@kernel(error_model="numpy")
 def increment(
-    law_id, par, length, tolerance, free, m, change, sig, state, eps, tangent, old_sig, old_state, deps, bend, a, b
-):
+    law_id, par, length, tolerance, share, m, change, sig, state, eps, tangent, old_sig, old_state, deps, bend, a, b,
+    x, miss,
+):  # fmt: skip
     """One increment: change[i] is the strain change, or the new stress of a component under stress control.
 
-    free[:m] lists the components under stress control. tangent holds the one of the last increment (the
-    predictor) and gets the new one. bend (n + 1,) holds by how much the last predictor missed the strains under
-    stress control, and the size of that increment: a miss grows as the square of the size, which makes the next
-    predictor one order better. sig, state, eps change in place on success; on failure they are as before and
-    False is returned.
+    share, m: the unknown strains, see `number_unknowns`. tangent holds the one of the last increment (the
+    predictor) and gets the new one. bend (n + 1,) holds by how much the last predictor missed the unknown strains,
+    and the size of that increment: a miss grows as the square of the size, which makes the next predictor one order
+    better. sig, state, eps change in place on success; on failure they are as before and False is returned.
     """
     n = sig.shape[0]
+    scale = 0.0
     for i in range(n):
         old_sig[i] = sig[i]
+        scale = max(scale, abs(sig[i]))
         deps[i] = change[i]
+        if share[i] >= 0:
+            deps[i] = 0.0
+            scale = max(scale, abs(change[i]))
     for i in range(state.shape[0]):
         old_state[i] = state[i]
-    scale = 0.0
-    for i in range(m):
-        deps[free[i]] = 0.0
-    for i in range(n):
-        scale = max(scale, abs(sig[i]))
-    for i in range(m):
-        scale = max(scale, abs(change[free[i]]))
     # predictor: what the last tangent makes of the prescribed changes
     if m > 0:
-        for i in range(m):
-            row = free[i]
-            known = change[row] - sig[row]
+        for i in range(n):
+            miss[i] = change[i] - sig[i]
             for j in range(n):
-                known -= tangent[row, j] * deps[j]
-            b[i] = known
-            for j in range(m):
-                a[i, j] = tangent[row, free[j]]
-        if solve_small(a, b, m):
-            for i in range(m):
-                deps[free[i]] = b[i]
+                miss[i] -= tangent[i, j] * deps[j]
+        equations(share, m, miss, tangent, a, b)
+        solved = solve_small(a, b, m)
+        for i in range(m):
+            x[i] = b[i] if solved else 0.0
         stride = 0.0
         for i in range(n):
-            stride += abs(deps[i])
+            stride += abs(x[share[i]] if share[i] >= 0 else deps[i])
         ratio = stride / bend[n] if bend[n] > 0.0 else 0.0
         grown = ratio * ratio if ratio < 2.0 else 0.0
         bend[n] = stride
         for i in range(m):
             foreseen = grown * bend[i]
-            bend[i] = deps[free[i]]
-            deps[free[i]] += foreseen
-    # One stress under control is one equation: its root is kept between bounds, so that a kink in the law cannot make
-    # Newton go back and forth. A free side is at one: it is the largest principal stress of a pressed plane, 0.
+            bend[i] = x[i]
+            x[i] += foreseen
+    # One unknown is one equation: its root is kept between bounds, so that a kink in the law cannot make Newton go
+    # back and forth. A free side is at one: it is the largest principal stress of a pressed plane, 0.
     below, above = -np.inf, np.inf
     for iteration in range(_NEWTON if m != 1 else _BRACKETED):
+        for i in range(n):
+            if share[i] >= 0:
+                deps[i] = x[share[i]]
         code = update(law_id, deps, sig, state, par, length, tangent)
         if code != OK:
             break
-        worst = 0.0
         size = scale
         for i in range(n):
             size = max(size, abs(sig[i]))
+            miss[i] = change[i] - sig[i]
+        equations(share, m, miss, tangent, a, b)
+        worst = 0.0
         for i in range(m):
-            miss = abs(change[free[i]] - sig[free[i]])
-            worst = max(worst, miss) if miss == miss else np.inf
+            worst = max(worst, abs(b[i])) if b[i] == b[i] else np.inf
         if worst <= tolerance * size:
+            level(share, m, sig)
             for i in range(n):
                 eps[i] += deps[i]
             for i in range(m):
-                bend[i] = deps[free[i]] - bend[i]
+                bend[i] = x[i] - bend[i]
             return True
-        for i in range(m):
-            row = free[i]
-            b[i] = change[row] - sig[row]
-            for j in range(m):
-                a[i, j] = tangent[row, free[j]]
-        last = sig[free[0]] if m > 0 else 0.0
+        lacking = b[0]
         for i in range(n):
             sig[i] = old_sig[i]
         for i in range(state.shape[0]):
             state[i] = old_state[i]
         solved = solve_small(a, b, m)
         if m == 1:
-            now = deps[free[0]]
-            if change[free[0]] > last:
+            now = x[0]
+            if lacking > 0.0:
                 below = max(below, now)
             else:
                 above = min(above, now)
@@ -149,7 +113,7 @@ def increment(
         if not solved:
             break
         for i in range(m):
-            deps[free[i]] += b[i]
+            x[i] += b[i]
     for i in range(n):
         sig[i] = old_sig[i]
     for i in range(state.shape[0]):
@@ -170,14 +134,10 @@ def drive(
     beyond the end hold the last state. state_out may have 0 rows.
     """
     rows, n = targets.shape
-    free = np.empty(n, np.int64)
-    m = 0 * n  # not the literal 0, which would compile `increment` twice
-    for i in range(n):
-        if control[i] == 1:
-            free[m] = i
-            m += 1
-    work = np.empty((4, n))
-    change, deps, b, old_sig = work[0], work[1], work[2], work[3]
+    share = np.empty(n, np.int64)
+    m = number_unknowns(law_id, control, targets, sig, tolerance, share)
+    work = np.empty((6, n))
+    change, deps, b, old_sig, x, miss = work[0], work[1], work[2], work[3], work[4], work[5]
     old_state = np.empty(state.shape[0])
     bend = np.zeros(n + 1)
     a = np.empty((n, n))
@@ -206,8 +166,8 @@ def drive(
                     full = targets[row, i] - now
                     change[i] = now + (done + size) * full if control[i] == 1 else size * full
                 if increment(
-                    law_id, par, length, tolerance, free, m, change, sig, state, eps, tangent, old_sig, old_state,
-                    deps, bend, a, b,
+                    law_id, par, length, tolerance, share, m, change, sig, state, eps, tangent, old_sig, old_state,
+                    deps, bend, a, b, x, miss,
                 ):  # fmt: skip
                     done += size
                     size = min(2.0 * size, 1.0 / parts)
