@@ -303,7 +303,10 @@ class CurveFit:
 
     def residuals(self, values: Array, shifts: Array | None = None) -> Array:
         """Weighted residuals (c, m): one per compared point, then one per curve for the part of it without
-        solution; shifts as in `predict`."""
+        solution; shifts as in `predict`.
+
+        Rows are contiguous whatever c is: numpy adds up in another order where they are not, and sums of one point
+        would depend on how many others came with it."""
         found = self.predict(values, shifts)
         curve, row, column = self._where
         model = np.where(self._kind == 0, found.stress[:, curve, row, column], found.strain[:, curve, row, column])
@@ -311,12 +314,15 @@ class CurveFit:
         missing = np.clip(1.0 - found.reached / (self._rows - 1), 0.0, 2.0) + found.moved[:, None]
         # a strain that runs away must not overflow the sum of squares
         parts = np.clip((model - self._goal) * self._weight, -1e6, 1e6)
-        return np.concatenate([parts, self.weights.penalty * missing / np.sqrt(len(self.curves))], axis=1)
+        out = np.empty((len(parts), self.points + len(self.curves)))
+        out[:, : self.points] = parts
+        out[:, self.points :] = self.weights.penalty * missing / np.sqrt(len(self.curves))
+        return out
 
     def objective(self, values: Array) -> Array:
         """Sum of squared residuals (c,)."""
         r = self.residuals(values)
-        return np.einsum("ij,ij->i", r, r)
+        return np.sum(r * r, axis=1)
 
     def errors(self, values: Array) -> dict[str, Any]:
         """Plain root mean squares of one candidate (k,): all curves and each, stress in Pa and strain; and

@@ -97,7 +97,7 @@ def levenberg_marquardt(
         points[:, free] = np.clip(x[free] + moves * (move_limit / largest)[:, None], 0.0, 1.0)
         tried = function(points)
         evaluations += trials
-        totals = np.einsum("ij,ij->i", tried, tried)
+        totals = np.sum(np.ascontiguousarray(tried * tried), axis=1)
         totals[~np.isfinite(totals)] = np.inf
         i = int(np.argmin(totals))
         if totals[i] < value:

@@ -89,7 +89,7 @@ class Found:
 
 def sum_of_squares(residuals: Residuals, points: Array) -> Array:
     """(c, k) points -> (c,) sums; each depends on its own point alone, to the last bit."""
-    r = residuals(points)
+    r = np.ascontiguousarray(residuals(points))  # numpy adds along rows in one order only where they are contiguous
     return np.sum(r * r, axis=1)
 
 
