@@ -1,4 +1,4 @@
-"""The value of a point depends on that point alone, to the last bit: not on how many come with it, nor on who asks."""
+"""The value of a point depends on that point alone to the last bit, not on how many come with it, nor on who asks."""
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from functools import partial
