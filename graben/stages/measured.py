@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -310,7 +309,13 @@ def _dialect(table: TextTable, columns: Columns, dropped: int, repeated: int) ->
 
 def _tell(path: Path, read: dict[str, Any]) -> None:
     """The reading in the log; what was left out as a warning."""
-    _log.info("%s: %s", path, json.dumps(read, ensure_ascii=False))
+    units = f", units in row {read['units_row']}" if read["units_row"] else ""
+    tests = ", ".join(f"{t['name']} ({t['points']} points, told by {t['told_by']})" for t in read["tests"])
+    _log.info(
+        "%s: %s, %s line ends, separator %s, decimal mark %s, header in row %d%s, %d rows, %d empty; tests: %s",
+        path, read["encoding"], read["line_ends"], read["separator"], read["decimal_mark"], read["header_row"], units,
+        read["rows"], read["empty_rows"], tests,
+    )  # fmt: skip
     left = [
         f"{read[key]} {words}"
         for key, words in (("dropped_rows", "rows that lack a number"), ("repeated_rows", "rows said twice"))

@@ -4,6 +4,7 @@ import importlib.util
 
 import numpy as np
 import pytest
+import xarray
 
 from tests.conftest import PIPELINES
 
@@ -33,3 +34,18 @@ def test_the_name_of_a_set_of_curves_follows_what_decides_them():
     other = PIPELINES / "upscaling/slope-blocks.toml"
     names = {verify_udec.fingerprint(s, f) for s in (scene, other) for f in ("draft", "standard")}
     assert len(names) == 4
+
+
+def test_strain_of_an_artifact_counts_from_its_first_state(monkeypatch, tmp_path):
+    strain = np.zeros((1, 3, 4))
+    strain[0, :, 0], strain[0, :, 1] = [0.01, 0.012, 0.014], [-0.02, -0.03, -0.04]
+    data = xarray.Dataset(
+        {
+            "step_count": ("path", [3]),
+            "stress": (("path", "step", "component"), np.zeros((1, 3, 4))),
+            "strain": (("path", "step", "component"), strain),
+        }
+    )
+    monkeypatch.setattr("graben.schemas.artifact.read_artifact", lambda path, kind: data)
+    _stress, found = verify_udec.our_curves(tmp_path / "curves.nc")
+    np.testing.assert_allclose(found, [[0.0, 0.0], [-0.002, 0.01], [-0.004, 0.02]], atol=1e-15)

@@ -106,7 +106,8 @@ def test_one_curve_in_any_spelling_is_one_curve(folder, wanted, data):
     same(read_measured([put(folder, content, encoding)], COMPRESSION), wanted)
 
 
-def test_what_was_found_out_is_reported(tmp_path):
+def test_what_was_found_out_is_reported(tmp_path, caplog):
+    caplog.set_level("INFO")
     content = text(BARE, ";", ",", "\r\n", ("Labor für Fels", ""), UNITS, ";", 6, True)
     (part,) = read_files([put(tmp_path, content, "cp1252")], COMPRESSION)
     assert part.read | {
@@ -114,6 +115,7 @@ def test_what_was_found_out_is_reported(tmp_path):
         "preamble_rows": 2, "header_row": 3, "units_row": 4, "rows": 24, "empty_rows": 4, "comment_rows": 1,
         "dropped_rows": 0, "ignored_columns": [],
     } == part.read  # fmt: skip
+    assert "separator semicolon, decimal mark comma, header in row 3, units in row 4, 24 rows" in caplog.text
     assert part.read["columns"]["strain_xx"] == "lateral strain"
     assert [t["name"] for t in part.read["tests"]] == ["R 1", "R 2"]
     assert part.read["tests"][1]["lateral_stress_pa"] == pytest.approx(-2400250.0)
@@ -152,6 +154,20 @@ def test_a_commented_header_and_exponents(tmp_path, wanted):
     data = [[c if isinstance(c, str) else f"{c:.12e}".replace(".", ",").upper() for c in r] for r in rows()]
     content = "# " + text(separator=";", data=data)
     same(read_measured([put(tmp_path, content)], COMPRESSION), wanted)
+
+
+def test_quoted_decimal_commas_between_commas(tmp_path, wanted):
+    (part,) = read_files([put(tmp_path, text(mark=","))], COMPRESSION)
+    same(part.curves, wanted)
+    assert (part.read["separator"], part.read["decimal_mark"]) == ("comma", "comma")
+
+
+def test_a_title_over_two_lines_and_an_index_without_title(tmp_path, wanted):
+    data = [[f"{i}", *r] for i, r in enumerate(rows())]
+    content = text(["", *PLAIN], data=data).replace("stress_yy_kpa", '"Axial stress\n[kPa]"')
+    (part,) = read_files([put(tmp_path, content)], COMPRESSION)
+    same(part.curves, wanted)
+    assert part.read["header_row"] == 2 and part.read["ignored_columns"] == ["(column 1)"]
 
 
 def faults(folder, content, encoding="utf-8", reading=COMPRESSION, name="lab.csv"):
