@@ -70,11 +70,9 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
     progress(0.0, f"{tessellation.size} blocks come to rest")
     if parts is None:
         test.begin(progress)
-    else:
-        _bring_back(blocks_checkpoint.path_for(output), model, test, parts)
     history = History(model, scene.output.balance)
     if parts is not None:
-        history.bring_back(parts["history"])
+        _bring_back(blocks_checkpoint.path_for(output), model, test, history, parts)
     keeper = blocks_checkpoint.Keeper(output, scene)
 
     def save() -> None:
@@ -153,12 +151,15 @@ def prepare(scene: BlocksScene) -> Prepared:
     return Prepared(tessellation, model, test, sizes)
 
 
-def _bring_back(path: Path, model: BlockModel, test: Biaxial | Rising, parts: dict[str, Any]) -> None:
+def _bring_back(
+    path: Path, model: BlockModel, test: Biaxial | Rising, history: History, parts: dict[str, Any]
+) -> None:
     try:
         snapshot.bring_back(model, parts["model"])
         test.bring_back(parts["test"])
-    except (ValueError, KeyError) as error:
-        raise BadInput(Fault(str(path), "--restart", "", f"a checkpoint of this version ({error})")) from error
+        history.bring_back(parts["history"])
+    except Refused as error:
+        raise BadInput(Fault(str(path), "--restart", "", f"a checkpoint of this model ({error})")) from error
 
 
 def _tessellation(scene: BlocksScene) -> Tessellation:

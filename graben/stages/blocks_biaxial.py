@@ -15,6 +15,7 @@ from graben.mechanics.blocks.model import BlockModel
 from graben.mechanics.blocks.pace import ForceCheck, Pace
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.schemas.scenes.blocks_loading import Loading
+from graben.stages.blocks_checkpoint import refuse_unlike
 from graben.stages.record import Progress
 
 
@@ -76,6 +77,7 @@ class Biaxial:
         return {"rest": self.rest, **pace}
 
     def bring_back(self, state: dict[str, np.ndarray]) -> None:
+        refuse_unlike(state, self.state())
         self.rest = state["rest"]
         if self.pace is not None:
             self.pace = Pace(**{f.name: state[f"pace_{f.name}"].item() for f in fields(Pace)})

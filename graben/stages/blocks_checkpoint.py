@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault
+import graben
+from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.blocks import snapshot
 from graben.mechanics.blocks.history import History
 from graben.mechanics.blocks.model import BlockModel
-from graben.schemas.files import whole_file
 from graben.schemas.outputs import CHECKPOINT, beside
+from graben.schemas.saved import Arrays, read_saved, write_saved
 from graben.schemas.scene import Scene
 
 # Wall time between checkpoints on disk; a killed run loses no more than this and one saved state [s].
 EVERY_S = 60.0
-
-Arrays = dict[str, np.ndarray]
 
 
 def path_for(output: Path) -> Path:
@@ -53,10 +52,8 @@ class Keeper:
         if self._history is None:
             return None
         rows = self._history.stored(int(self._last["states"]))
-        stored: dict[str, Any] = {"scene": np.array(self.scene.source.sha256), **self._last}
-        stored |= {f"history.{k}": v for k, v in rows.items()}
-        with whole_file(path_for(self.output)) as temporary:
-            np.savez(temporary, **stored)
+        stored = self._last | {f"history.{k}": v for k, v in rows.items()}
+        write_saved(path_for(self.output), _marks(self.scene), stored)
         self._written = time.monotonic()
         return path_for(self.output)
 
@@ -71,26 +68,38 @@ class Keeper:
         path_for(self.output).unlink(missing_ok=True)
 
 
+def _marks(scene: Scene) -> dict[str, str]:
+    """What a checkpoint belongs to."""
+    return {"scene": scene.source.sha256, "version": graben.__version__}
+
+
 def read(output: Path, scene: Scene) -> dict[str, Arrays]:
     """The parts of a checkpoint: "model", "test" and "history".
 
     Raises
     ------
-    BadInput : there is none, or it belongs to another scene
+    BadInput : there is none, it is damaged, or it belongs to another scene
     """
     path = path_for(output)
     if not path.is_file():
         raise BadInput(Fault(str(path), "--restart", "", "a checkpoint, as an interrupted run leaves it"))
     parts: dict[str, Arrays] = {"model": {}, "test": {}, "history": {}}
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            found = str(stored["scene"])
-            for name in stored.files:
-                part, _, rest = name.partition(".")
-                if part in parts:
-                    parts[part][rest] = stored[name]
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        raise BadInput(Fault(str(path), "--restart", "", f"a whole checkpoint ({error})")) from error
-    if found != scene.source.sha256:
-        raise BadInput(Fault(str(path), "--restart", "a checkpoint of another scene", "the same scene and --set"))
+    for name, values in read_saved(path, _marks(scene), "that of the same scene, --set and version").items():
+        part, _, rest = name.partition(".")
+        if part in parts:
+            parts[part][rest] = values
     return parts
+
+
+def refuse_unlike(state: Arrays, own: Arrays, changing: Iterable[str] = ()) -> None:
+    """Refused where a state of the loading is not of the shapes and kinds of its own first one.
+
+    changing : names whose first length changes in a run
+    """
+    for name, values in own.items():
+        found, like = state.get(name), np.asarray(values)
+        skip = 1 if name in changing else 0
+        if found is None or found.dtype.kind != like.dtype.kind or found.shape[skip:] != like.shape[skip:]:
+            raise Refused(f"test.{name}: shape {like.shape} of {like.dtype}")
+        if found.dtype.kind == "f" and np.isnan(found).any():
+            raise Refused(f"test.{name}: numbers")

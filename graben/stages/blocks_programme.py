@@ -18,6 +18,7 @@ from graben.mechanics.blocks.model import BlockModel
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.schemas.scenes.blocks_loading import Load, Programme
 from graben.stages.blocks_biaxial import energy_error, kinetic_share
+from graben.stages.blocks_checkpoint import refuse_unlike
 from graben.stages.record import Progress
 
 
@@ -141,18 +142,23 @@ class Rising:
             "next_save": np.array(self.next_save),
             "dug": np.array(self.dug),
             "released": np.array([released[:2] for released in self.released]).reshape(-1, 2),
-            "released_forces": np.array([forces for _, _, forces in self.released]),
+            "released_forces": np.array([forces for _, _, forces in self.released]).reshape(-1, *self.carried.shape),
             **{f"rise_{k}": np.array(v) for k, v in asdict(self.rise).items()},
         }
 
     def bring_back(self, state: dict[str, np.ndarray]) -> None:
+        refuse_unlike(state, self.state(), ("looks", "load_times", "released", "released_forces"))
+        if len(state["released"]) != len(state["released_forces"]):
+            raise Refused("test.released: as many as released_forces")
+        if not 0 <= state["dug"] <= len(self._digs):
+            raise Refused(f"test.dug: 0 to {len(self._digs)}")
         self.rest, self.carried = state["rest"], state["carried"]
         self.looks = [tuple(row) for row in state["looks"].tolist()]
         self.load_times = state["load_times"].tolist()
         self.next_save = float(state["next_save"])
         self.dug = int(state["dug"])
         self.loads.take_off(self.model.removed[self.model.bodies.vertex_block])
-        for (start, over), forces in zip(state["released"], state["released_forces"], strict=True):
+        for (start, over), forces in zip(state["released"], state["released_forces"]):
             self._release(float(start), float(over), forces)
         self.rise = mechanics.Rise(**{f.name: state[f"rise_{f.name}"].item() for f in fields(mechanics.Rise)})
 

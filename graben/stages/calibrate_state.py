@@ -12,9 +12,12 @@ import numpy as np
 import graben
 from graben.errors import BadInput, Fault
 from graben.mechanics.search.multistart import Help, Start
-from graben.schemas.files import whole_file
 from graben.schemas.provenance import sha256_of
+from graben.schemas.saved import Arrays, read_saved, write_saved
 from graben.stages.calibrate_workers import Workers
+
+# Tables of a finished start: name, kind of dtype, dimensions.
+_PARTS = (("members", "f", 2), ("values", "f", 1), ("reasons", "U", 1), ("history", "f", 1), ("evaluations", "i", 0))
 
 
 def digest_of(scene_texts: Iterable[str], inputs: Iterable[Path]) -> str:
@@ -36,23 +39,27 @@ class State:
         """Take up what an interrupted run left; without a file nothing was left. BadInput where it does not fit."""
         if not self.path.is_file():
             return
-        try:
-            with np.load(self.path, allow_pickle=False) as data:
-                found = str(data["digest"])
-                tables = {name: data[name] for name in data.files if name != "digest"}
-        except (OSError, ValueError, KeyError) as error:
-            raise BadInput(Fault(str(self.path), "--restart", "", f"a readable state ({error})")) from None
-        if found != self.digest:
-            expected = "a state of the same scene, curves and version; without --restart it is begun anew"
-            raise BadInput(Fault(str(self.path), "--restart", "", expected))
+        expected = "that of the same scene, curves and version; without --restart it is begun anew"
+        tables = read_saved(self.path, {"digest": self.digest}, expected)
         for name in tables:
             if name.endswith("|members"):
                 search, number, _ = name.rsplit("|", 2)
-                part = {k: tables[f"{search}|{number}|{k}"] for k in ("values", "reasons", "history", "evaluations")}
-                self.starts.setdefault(search, {})[int(number)] = Start(
-                    tables[name], part["values"], tuple(map(str, part["reasons"])), part["history"],
-                    int(part["evaluations"]),
-                )  # fmt: skip
+                self.starts.setdefault(search, {})[int(number)] = self._start(tables, f"{search}|{number}")
+
+    def _start(self, tables: Arrays, name: str) -> Start:
+        """One finished start; BadInput where its tables do not fit together."""
+        found = {part: tables.get(f"{name}|{part}", np.array(None)) for part, _, _ in _PARTS}
+        count = len(found["members"]) if found["members"].ndim else 0
+        for part, kind, dimensions in _PARTS:
+            table = found[part]
+            fits = table.dtype.kind == kind and table.ndim == dimensions
+            if part in ("members", "values", "reasons"):
+                fits = fits and len(table) == count > 0
+            if not fits or (kind == "f" and not np.isfinite(table).all()):
+                raise BadInput(Fault(str(self.path), f"{name}|{part}", "", "a finished start of a search"))
+        reasons = tuple(map(str, found["reasons"]))
+        evaluations = int(found["evaluations"])
+        return Start(found["members"], found["values"], reasons, found["history"], evaluations)
 
     def help(self, search: str) -> Help:
         """For the search of that name: who evaluates, what is done, and where to put what gets done."""
@@ -68,10 +75,9 @@ class State:
         self.path.unlink(missing_ok=True)
 
     def _write(self) -> None:
-        tables = {"digest": np.array(self.digest)}
+        tables = {}
         for search, numbers in self.starts.items():
             for number, start in numbers.items():
                 for name in ("members", "values", "reasons", "history", "evaluations"):
-                    tables[f"{search}|{number}|{name}"] = np.array(getattr(start, name))
-        with whole_file(self.path) as temporary:
-            np.savez(temporary, **tables)  # type: ignore[arg-type]
+                    tables[f"{search}|{number}|{name}"] = getattr(start, name)
+        write_saved(self.path, {"digest": self.digest}, tables)

@@ -140,6 +140,13 @@ def test_restart_wants_a_checkpoint_of_this_scene(scene):
         dem_run.run(scene, output, progress=stop)
     with pytest.raises(BadInput, match="another scene"):
         dem_run.run(scene, output, restart=True, overrides=["seed=3"])
+    kept = scene.with_name("none.checkpoint.npz")
+    whole = kept.read_bytes()
+    for data in (whole[: len(whole) // 2], b""):
+        kept.write_bytes(data)
+        with pytest.raises(BadInput, match="saved states") as error:
+            dem_run.run(scene, output, restart=True)
+        assert error.value.faults[0].file == str(kept)
 
 
 def test_a_body_that_does_not_stand_is_a_failure_of_the_run(scene):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from graben.errors import Refused
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.balance import balance
 from graben.mechanics.blocks.model import BlockModel
@@ -97,7 +98,31 @@ class History:
         return result
 
     def bring_back(self, stored: dict[str, np.ndarray]) -> None:
-        """Take up the states of `stored`."""
+        """Take up the states of `stored`. Refused where they are not those of a model like this one."""
+        like = History(self.model, bool(self.optional))
+        like.save()
+        states = len(stored.get("time", ()))
+        for name, own in like.stored(1).items():
+            found = stored.get(name)
+            if found is None or found.dtype != own.dtype or found.shape[1:] != own.shape[1:]:
+                raise Refused(f"history.{name}: shape (..., {own.shape[1:]}) of {own.dtype}")
+            if name in ("reference", "start_time") and found.shape != own.shape:
+                raise Refused(f"history.{name}: shape {own.shape}")
+            each = name in ("time", "overlap", "damping") or name.endswith(".sizes")
+            if each and (found.shape != (states,) or states == 0):
+                raise Refused(f"history.{name}: as many entries as saved states ({states})")
+            if found.dtype.kind == "f" and not np.isfinite(found).all():
+                raise Refused(f"history.{name}: finite numbers")
+        for name, rows in like.rows.items():
+            sizes, length = stored[f"{name}.sizes"], len(stored[f"{name}.rows"])
+            varies = name.startswith("contact")
+            if (sizes < 0).any() or sizes.sum() != length or not (varies or (sizes == len(rows[0])).all()):
+                raise Refused(f"history.{name}.sizes: those of its rows")
+        pair, blocks = stored["contact_pair.rows"], len(self.model.bodies.block_area)
+        if pair.size and (pair.min() < 0 or pair.max() >= blocks):
+            raise Refused(f"history.contact_pair: blocks 0 to {blocks - 1}")
+        if (np.diff(stored["time"]) <= 0.0).any():
+            raise Refused("history.time: rising values")
         self.reference = stored["reference"]
         self.start_time = float(stored["start_time"])
         for name in ("time", "overlap", "damping"):

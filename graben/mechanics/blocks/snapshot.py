@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from operator import attrgetter
+from typing import Any
 
 import numpy as np
 
-from graben.mechanics.blocks.contact import empty_rows
+from graben.errors import Refused
+from graben.mechanics.blocks.joints import BROKEN, STICK
 from graben.mechanics.blocks.model import BlockModel
+from graben.mechanics.blocks.plastic_zones import ELASTIC, LOST, PlasticZones
+from graben.mechanics.blocks.watch import AWAY, CLOSED, fresh_watch
 
 _GROUPS = ("motion", "pairs", "skeleton", "skeleton.zones")
 _COUNTERS = ("steps_done", "rebuilds")
+# Integers of motion and skeleton that stepping changes.
+_CHANGING = ("kind", "turn", "due", "flag")
 
 
 def take(model: BlockModel) -> dict[str, np.ndarray]:
@@ -30,30 +36,88 @@ def take(model: BlockModel) -> dict[str, np.ndarray]:
 
 
 def bring_back(model: BlockModel, state: dict[str, np.ndarray]) -> None:
-    """Put a state of `take` into a model built from the same scene. ValueError when it does not fit."""
-    if len(model.motion.x) != len(state.get("motion.x", ())) or model.held.shape != state["held"].shape:
-        raise ValueError("state of another model: number of vertices")
-    for group in _GROUPS:
-        own = attrgetter(group)(model)
-        found = {}
-        for name, value in own._asdict().items():
-            if not isinstance(value, np.ndarray):
-                continue
-            stored = state.get(f"{group}.{name}")
-            # Only lists of contacts and of constraints change their length.
-            if stored is None or stored.dtype != value.dtype or stored.ndim != value.ndim:
-                raise ValueError(f"state of another model: {group}.{name}")
-            found[name] = np.ascontiguousarray(stored)
-        if group == "skeleton.zones":
-            model.skeleton = model.skeleton._replace(zones=own._replace(**found))
-        else:
-            setattr(model, group, own._replace(**found))
-    rows = empty_rows(len(model.pairs.key), len(model.pairs.seat) > 0)
-    model.motion = model.motion._replace(rows=rows)
+    """Put a state of `take` into a model built from the same scene.
+
+    Raises
+    ------
+    Refused : it does not fit: lengths, kinds, numbers that are none, indices and flags out of range
+    """
+    _refuse_unlike(model, state)
+    model.pairs = _group(model, state, "pairs")
+    _refuse_pairs(model)
     model.held[:] = state["held"]
+    model._list_held()
+    watch = fresh_watch(model.pairs, model.parts, model.motion.node, len(model.joints))
+    model.motion = model.motion._replace(**watch)
+    for group in ("motion", "skeleton", "skeleton.zones"):
+        found, own = _group(model, state, group), attrgetter(group)(model)
+        for name, value in found._asdict().items():
+            before = getattr(own, name)
+            # What depends on geometry and contacts alone is known already; compiled loops take it on trust.
+            known = isinstance(value, np.ndarray) and value.dtype.kind == "i" and name not in _CHANGING
+            if isinstance(value, np.ndarray) and (
+                value.shape != before.shape or (known and not np.array_equal(value, before))
+            ):
+                raise _other(f"{group}.{name} of the same model")
+        if group == "skeleton.zones":
+            model.skeleton = model.skeleton._replace(zones=found)
+        else:
+            setattr(model, group, found)
+    _within("motion.kind", model.motion.kind, CLOSED, AWAY)
+    _within("motion.turn", model.motion.turn, 0, len(model.pairs.key))
+    if isinstance(model.skeleton.zones, PlasticZones):
+        _within("zones.flag", model.skeleton.zones.flag, ELASTIC, LOST)
+    model.motion = model.motion._replace(rows=watch["rows"])
     model.removed[:] = state["removed"]
     model.weight[model.removed[model.bodies.vertex_block]] = 0.0
     model.excavated = float(state["excavated"])
     model.time = float(state["time"])
     for name in _COUNTERS:
         setattr(model, name, int(state[name]))
+
+
+def _refuse_unlike(model: BlockModel, state: dict[str, np.ndarray]) -> None:
+    """Every array there, of the kind and number of dimensions that the model's own has, without nan."""
+    for name, own in take(model).items():
+        stored = state.get(name)
+        if stored is None or stored.dtype != own.dtype or stored.ndim != own.ndim:
+            raise _other(f"{name}: {own.ndim} dimensions of {own.dtype}")
+        # Only lists of contacts and of constraints change their length.
+        if name.partition(".")[0] not in ("pairs", "motion", "skeleton") and stored.shape != own.shape:
+            raise _other(f"{name}: shape {own.shape}")
+        if stored.dtype.kind == "f" and np.isnan(stored).any():
+            raise _other(f"{name}: numbers")
+
+
+def _group(model: BlockModel, state: dict[str, np.ndarray], group: str) -> Any:
+    """A named tuple of the model with the arrays of a state."""
+    own = attrgetter(group)(model)
+    names = [name for name, value in own._asdict().items() if isinstance(value, np.ndarray)]
+    return own._replace(**{name: np.ascontiguousarray(state[f"{group}.{name}"]) for name in names})
+
+
+def _refuse_pairs(model: BlockModel) -> None:
+    p, nodes = model.pairs, len(model.motion.node)
+    n = len(p.key)
+    for name, value in p._asdict().items():
+        shape = (n, 2)[: value.ndim]
+        if value.shape != shape and not (name == "seat" and value.shape == (0, 2)):
+            raise _other(f"pairs.{name}: shape {shape}")
+    _within("pairs.first", p.first, 0, nodes - 1)
+    _within("pairs.second", p.second, 0, nodes - 1)
+    _within("pairs.joint", p.joint, 0, len(model.joints) - 1)
+    _within("pairs.flag", p.flag, STICK, BROKEN)
+    for name in ("live", "intact"):
+        _within(f"pairs.{name}", getattr(p, name), 0, 1)
+    first, second = p.first.astype(np.int64), p.second.astype(np.int64)
+    if not np.array_equal(p.key, first * nodes + second) or (np.diff(p.key) <= 0).any():
+        raise _other("pairs.key: pairs in their order, each once")
+
+
+def _other(expected: str) -> Refused:
+    return Refused(f"state of another model, or damaged: expected {expected}")
+
+
+def _within(name: str, values: np.ndarray, least: int, most: int) -> None:
+    if values.size and (values.min() < least or values.max() > most):
+        raise _other(f"{name}: {least} to {most}")

@@ -1,0 +1,67 @@
+"""Files from which a stopped run goes on: plain arrays with a checksum, read whole or refused.
+
+Nothing in them is unpickled. A file that does not carry the digest of its contents is refused before anything in it
+is used, so that no damaged index gets into compiled code.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from graben.errors import BadInput, Fault
+from graben.schemas.files import whole_file
+
+Arrays = dict[str, np.ndarray]
+
+_DIGEST = "sha256"
+
+
+def write_saved(path: Path, owner: Mapping[str, str], arrays: Mapping[str, Any]) -> None:
+    """Write arrays (numbers or text) by name; owner: what they belong to, by the names of its marks."""
+    stored = {name: np.asarray(values) for name, values in {**owner, **arrays}.items()}
+    with whole_file(path) as temporary:
+        np.savez(temporary, **stored, **{_DIGEST: np.array(_digest(stored))})  # type: ignore[arg-type]
+
+
+def read_saved(path: Path, owner: Mapping[str, str], expected: str) -> Arrays:
+    """The arrays of a file of `write_saved`.
+
+    Parameters
+    ----------
+    owner : the marks that the file must bear; expected: in words, for a file with other marks
+
+    Raises
+    ------
+    BadInput : not readable, damaged, or of another owner
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            stored = {name: data[name] for name in data.files}
+        found = str(stored.pop(_DIGEST, "(absent)"))
+        damaged = found != _digest(stored)
+    except Exception as error:  # whatever damaged bytes make of the readers of zip, zlib and npy
+        raise BadInput(Fault(str(path), "--restart", "", f"a whole file of saved states ({error})")) from None
+    if damaged:
+        raise BadInput(Fault(str(path), _DIGEST, found[:12], "the digest of the file's contents; it is damaged"))
+    others = [
+        Fault(str(path), "--restart", f"a file of another {name}", expected)
+        for name, mark in owner.items()
+        if str(stored.pop(name, "")) != mark
+    ]
+    if others:
+        raise BadInput(others)
+    return stored
+
+
+def _digest(arrays: Mapping[str, np.ndarray]) -> str:
+    total = hashlib.sha256()
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        total.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
+        total.update(array.tobytes())
+    return total.hexdigest()
