@@ -6,13 +6,13 @@ inside ``with session.progress() as progress`` and hands the headline numbers to
 
 from __future__ import annotations
 
-import json
 import logging
+import os
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,9 +28,16 @@ class Program:
     """What is started from a shell answers signals from its first moment; see `graben.interrupts`."""
 
     def main(self, args: Any = None, *rest: Any, **extra: Any) -> Any:
-        if args is None:
-            interrupts.take()
-        return super().main(args, *rest, **extra)  # type: ignore[misc]
+        if args is not None:
+            return super().main(args, *rest, **extra)  # type: ignore[misc]
+        interrupts.take()
+        _open_closed_streams()
+        try:
+            return super().main(args, *rest, **extra)  # type: ignore[misc]
+        except OSError as error:  # of help: what a command does is within Tool.invoke
+            _give_up_stdout()
+            _tell(f"standard output: cannot be written ({error.strerror})")
+            sys.exit(3)
 
 
 class Tool(Program, click.Command):
@@ -53,12 +60,12 @@ class Tool(Program, click.Command):
             outcome = explain(KeyboardInterrupt() if interrupted else error)
             name = ctx.info_name or "graben"
             if outcome is None:
-                click.echo(f"{name}: a fault of the program: {type(error).__name__}: {error}", err=True)
-                click.echo(f"{name}: please report it with the output of --debug", err=True)
+                _tell(f"{name}: a fault of the program: {type(error).__name__}: {error}")
+                _tell(f"{name}: please report it with the output of --debug")
                 ctx.exit(1)
             code, lines = outcome
             for line in lines:
-                click.echo(f"{name}: {line}", err=True)
+                _tell(f"{name}: {line}")
             ctx.exit(code)
 
 
@@ -73,15 +80,18 @@ class Session:
     def report(self, headline: Mapping[str, Any]) -> None:
         """Print the headline numbers on stdout: one JSON object, or aligned lines for a person.
 
-        A person finds `warnings` on stderr, below them.
+        A person finds `warnings` on stderr, below them. Where there is no number stands null, or "none".
         """
+        from graben.schemas.plain import plain, to_json
+
         if self.as_json:
-            click.echo(json.dumps(headline, default=_plain, allow_nan=False))
+            say([to_json(headline)])
         elif not self.quiet:
-            for line in _lines({name: value for name, value in headline.items() if name != "warnings"}):
-                click.echo(line)
-            for text in headline.get("warnings", []):
-                click.echo(f"warning: {text}", err=True)
+            found = plain(headline)
+            warnings = found.pop("warnings", [])
+            say(_lines(found))
+            for text in warnings:
+                _tell(f"warning: {text}")
 
     @contextmanager
     def progress(self) -> Iterator[Callable[[float, str], None]]:
@@ -113,18 +123,41 @@ def _plain_lines(every_s: float = 10.0) -> Callable[[float, str], None]:
             return
         last = now
         left = f", {(now - begun) * (1 - fraction) / fraction:.0f} s left" if fraction >= 0.02 else ""
-        click.echo(f"{100 * fraction:5.1f} % after {now - begun:.0f} s{left}: {message}", err=True)
+        _tell(f"{100 * fraction:5.1f} % after {now - begun:.0f} s{left}: {message}")
 
     return tell
 
 
-def _plain(value: Any) -> Any:
-    """Numbers of numpy and paths, for JSON."""
-    if hasattr(value, "tolist"):
-        return value.tolist()
-    if isinstance(value, Path):
-        return str(value)
-    raise TypeError(f"no JSON for {type(value).__name__}")
+def _open_closed_streams() -> None:
+    """Closed standard streams go nowhere; the next file that is opened would take their place."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+
+
+def _give_up_stdout() -> None:
+    """Forget what could not be written: Python would try again at its end."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def say(lines: Iterable[str]) -> None:
+    """Lines on stdout. A reader that has gone away has what it wanted; any other refusal is the machine's."""
+    try:
+        for line in lines:
+            click.echo(line)
+    except OSError as error:
+        _give_up_stdout()
+        if not isinstance(error, BrokenPipeError):
+            from graben.errors import MachineFailed
+
+            raise MachineFailed("standard output", error.strerror or str(error)) from error
+
+
+def _tell(text: str) -> None:
+    """A line on stderr; nothing ends because nobody reads it."""
+    with suppress(OSError):
+        click.echo(text, err=True)
 
 
 def _lines(headline: Mapping[str, Any], indent: str = "") -> Iterator[str]:
@@ -142,8 +175,9 @@ def _lines(headline: Mapping[str, Any], indent: str = "") -> Iterator[str]:
 
 
 def _short(value: Any) -> str:
-    value = value.tolist() if hasattr(value, "tolist") else value
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_short, value)) + "]"
+    return "none" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _session(ctx: click.Context, as_json: bool, quiet: bool, verbose: int) -> Session:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from graben.cli.options import Tool
+from graben.cli.options import Tool, say
 
 KINDS = ("blocks", "particles", "rev-study", "calibrate", "fem", "scratch", "wear")
 
@@ -16,4 +16,4 @@ def main(kind: str, schema: bool) -> None:
     """Print a commented scene template that `graben check` accepts."""
     from graben.schemas import template
 
-    click.echo(template.json_schema(kind) if schema else template.template(kind), nl=False)
+    say([(template.json_schema(kind) if schema else template.template(kind)).rstrip("\n")])

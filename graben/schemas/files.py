@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
+from graben import interrupts
 from graben.errors import MachineFailed
 
 _Parts = list[tuple[Path, Path]]
@@ -56,7 +57,8 @@ def together() -> Iterator[_Parts]:
     try:
         yield parts
         if parts:
-            _put_in_place(parts)
+            with interrupts.held():
+                _put_in_place(parts)
     finally:
         _waiting.reset(token)
         for temporary, _ in parts:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import graben
+from graben.schemas.plain import to_json
 from graben.schemas.scene import Scene
 
 
@@ -75,6 +76,6 @@ class Record:
             "scene_sha256": hashlib.sha256(self.scene_text.encode()).hexdigest(),
             "seed": -1 if self.seed is None else self.seed,
             "inputs": json.dumps(self.inputs, sort_keys=True),
-            "cost": json.dumps(self.closed_cost(), default=float),
+            "cost": to_json(self.closed_cost()),
             "warnings": "\n".join(self.warnings),
         }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import asdict, fields
 from typing import Any
@@ -233,8 +234,13 @@ class Rising:
             "steps": self.model.steps_done,
             "steps_waited": self.rise.waited_in_all,
             "energy_error": energy_error(arrays),
-            "kinetic_over_stored_energy": float(kinetic_share(arrays)[1:-1].mean()) if len(self.looks) else 0.0,
+            "kinetic_over_stored_energy": _mean(kinetic_share(arrays)[1:-1]),
         }
+
+
+def _mean(values: np.ndarray) -> float:
+    """Mean of the states between the first and the last; nan where there is none."""
+    return float(values.mean()) if values.size else math.nan
 
 
 def _course(load: Load) -> Course:

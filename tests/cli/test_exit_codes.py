@@ -1,5 +1,6 @@
 """0 done, 2 bad input, 3 numerics, 130 interrupted; a traceback only with --debug."""
 
+import errno
 import json
 
 import click
@@ -7,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from graben.cli.options import Session, Tool, session_options, stage_options
-from graben.errors import BadInput, Fault, NotFinite, NumericsFailed
+from graben.errors import BadInput, Fault, MachineFailed, NotFinite, NumericsFailed
 
 
 def tool(body):
@@ -43,6 +44,9 @@ TWO_FAULTS = BadInput([Fault("a.toml", "seed", "-1", "0 or more"), Fault("a.toml
             ["energy error 9 % at block 12 in step 40; halve the time step"],
         ),
         (NotFinite("stress holds nan"), 3, ["stress holds nan"]),
+        (MachineFailed("out/a.nc", "No space left on device"), 3, ["out/a.nc", "No space left"]),
+        (OSError(errno.ENOSPC, "No space left on device", "/tmp/x"), 3, ["/tmp/x", "No space left"]),
+        (MemoryError("12 GB"), 3, ["not enough memory: 12 GB"]),
         (KeyboardInterrupt(), 130, ["interrupted"]),
         (ZeroDivisionError("1/0"), 1, ["a fault of the program", "--debug"]),
     ],
@@ -68,10 +72,21 @@ def test_json_is_one_object_on_stdout():
     assert json.loads(result.stdout) == {"peak_pa": 2.5, "rows": [0, 1], "mixtures": [{"name": "a"}]}
 
 
-def test_json_never_holds_nan():
-    result = CliRunner().invoke(tool(lambda: {"peak_pa": float("nan")}), ["--json"])
-    assert result.exit_code == 1
-    assert result.stdout == ""
+def test_where_there_is_no_number_stands_null_or_none():
+    import numpy as np
+
+    body = lambda: {  # noqa: E731
+        "peak_pa": float("nan"), "rows": np.array([[1.0, np.inf]]), "a": {"b": [np.float64("nan"), -np.inf, 2]},
+        "table": [{"name": "x", "share": float("nan")}],
+    }  # fmt: skip
+    result = CliRunner().invoke(tool(body), ["--json"])
+    assert result.exit_code == 0
+    assert json.loads(result.stdout, parse_constant=lambda name: pytest.fail(name)) == {
+        "peak_pa": None, "rows": [[1.0, None]], "a": {"b": [None, None, 2]}, "table": [{"name": "x", "share": None}],
+    }  # fmt: skip
+    shown = CliRunner().invoke(tool(body), []).stdout
+    assert "nan" not in shown and "inf" not in shown
+    assert "peak_pa  none" in shown and "[none, none, 2]" in shown and "share none" in shown
 
 
 def test_people_get_aligned_lines_and_quiet_gets_none():
