@@ -126,7 +126,7 @@ def _on_cluster(
     from distributed import KilledWorker, wait
 
     results: dict[int, Any] = {}
-    with client:
+    with client, client.as_current():
         await_worker(client, address, patience_s)
         asked = dict.fromkeys(range(len(tasks)), 1)
         # One by one, so that tasks need not be hashable, and none is taken for another (pure).
@@ -157,7 +157,8 @@ def connect(address: str, patience_s: float) -> Client:
         expected = "Dask on this machine: pip install 'graben[cluster]'"
         raise BadInput(Fault("--cluster", "", address, f"{expected} ({error})")) from None
     try:
-        return Client(address, timeout=patience_s)
+        # As a default, Dask would send every computation of this process there, and go on when the client is gone.
+        return Client(address, timeout=patience_s, set_as_default=False)
     except (OSError, ValueError) as error:
         expected = f'the address of a Dask scheduler, such as "tcp://10.0.0.1:8786" ({error})'
         raise BadInput(Fault("--cluster", "", address, expected)) from None

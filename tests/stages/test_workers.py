@@ -49,6 +49,20 @@ def cluster():
     cloudpickle.unregister_pickle_by_value(sys.modules[__name__])
 
 
+@pytest.fixture
+def unspoiled_dask(tmp_path):
+    """What this process computes with Dask, and so every NetCDF file that it writes, stays as it was before."""
+    import dask.config
+    import distributed
+    import xarray
+
+    yield
+    assert dask.config.get("scheduler", None) is None
+    with pytest.raises(ValueError, match=r"[Cc]lient"):
+        distributed.default_client()
+    xarray.Dataset({"a": ("x", [1.0, 2.0])}).to_netcdf(tmp_path / "a.nc", engine="netcdf4")
+
+
 @pytest.mark.parametrize("processes", [1, 2, 4])
 def test_results_come_in_the_order_of_the_tasks(processes):
     told = []
@@ -89,14 +103,17 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(cluster, tmp_path):
     assert (tmp_path / "died").exists()
 
 
-def test_no_cluster_is_a_fault_of_the_option(cluster):
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nowhere://x", "127.0.0.1"])
+def test_no_cluster_is_a_fault_of_the_option(address, unspoiled_dask):
     with pytest.raises(BadInput, match="--cluster"):
-        compute(slow_square, TASKS, cluster="tcp://127.0.0.1:9", patience_s=1.0)
-    with pytest.raises(BadInput, match="--cluster"):
-        compute(slow_square, TASKS, cluster="nowhere://x", patience_s=1.0)
+        compute(slow_square, TASKS, cluster=address, patience_s=1.0)
 
 
-def test_a_cluster_without_workers():
+def test_a_cluster_leaves_no_scheduler_behind(cluster, unspoiled_dask):
+    assert compute(slow_square, TASKS, cluster=cluster) == [v**2 for v in TASKS]
+
+
+def test_a_cluster_without_workers(unspoiled_dask):
     distributed = pytest.importorskip("distributed")
     with (
         distributed.LocalCluster(n_workers=0, processes=True, dashboard_address=":0") as empty,
