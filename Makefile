@@ -9,6 +9,8 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 RESULTS ?= results
 FIDELITY ?= standard
+# The order of the tests, another each time so that none leans on another.
+SEED   := $(or $(SEED),$(shell date +%s))
 # Runs that do not wait for one another go side by side.
 JOBS   ?= $(shell nproc)
 ifeq ($(MAKELEVEL),0)
@@ -38,8 +40,13 @@ demo: $(READY) ## both chains at draft fidelity, one table, pictures (under 10 m
 	@$(BIN)/python pipelines/summary.py table $(RESULTS)
 
 .PHONY: test
-test: $(READY) ## the tests (under 12 minutes, compilation included)
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not verify"
+test: $(READY) ## the tests in random order (under 12 minutes, compilation included); again: SEED=N
+	@echo "order of the tests: make test SEED=$(SEED)"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not verify" --randomly-seed=$(SEED)
+
+.PHONY: matrix
+matrix: $(READY) ## the tests in other orders, threads, Pythons, versions, beside a load (an hour; ROWS="lowest busy")
+	$(BIN)/python tests/matrix.py $(ROWS)
 
 .PHONY: verify
 verify: $(READY) ## the long verification against closed forms

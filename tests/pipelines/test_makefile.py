@@ -11,7 +11,8 @@ COMMANDS = ("dem-run", "homogenize", "rev-study", "calibrate", "fem-run", "scrat
 
 
 def make(results, *arguments):
-    environment = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MAKELEVEL", "MFLAGS")}
+    ours = ("MAKEFLAGS", "MAKELEVEL", "MAKEOVERRIDES", "MFLAGS", "FIDELITY", "RESULTS", "JOBS", "PYTHON", "SEED")
+    environment = {k: v for k, v in os.environ.items() if k not in ours}
     call = ["make", "--no-print-directory", f"RESULTS={results}", *arguments, "upscaling", "wear"]
     done = subprocess.run(call, cwd=ROOT, capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr

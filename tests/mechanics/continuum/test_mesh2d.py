@@ -57,7 +57,7 @@ def test_halving_the_size_gives_about_four_times_the_elements():
         assert 3.3 < fine / coarse < 4.7
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.lists(st.floats(-0.25, 0.25), min_size=8, max_size=8), st.floats(0.1, 0.4))
 def test_any_convex_patch_is_filled(moves, size):
     corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], float) + np.reshape(moves, (4, 2))

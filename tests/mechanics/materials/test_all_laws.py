@@ -122,7 +122,7 @@ def history(rng: np.random.Generator, n: int, steps: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("law", DRAWS)
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(seed=st.integers(0, 2**31), decade=st.floats(3.0, 15.0))
 def test_every_finite_increment_has_an_answer(law: str, seed: int, decade: float) -> None:
     """Return code 0, all finite, plastic strain and damage never fall, damage below 1, answers bitwise the same."""
@@ -144,7 +144,7 @@ def test_every_finite_increment_has_an_answer(law: str, seed: int, decade: float
 
 
 @pytest.mark.parametrize("law", DRAWS)
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**31))
 def test_plane_and_space_agree(law: str, seed: int) -> None:
     rng, values = material(law, seed, 9.0)
@@ -163,7 +163,7 @@ def test_plane_and_space_agree(law: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("law", ISOTROPIC)
-@settings(max_examples=15, deadline=None, derandomize=True)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 2**31))
 def test_a_turned_history_gives_the_turned_stress(law: str, seed: int) -> None:
     rng, values = material(law, seed, 9.0)
@@ -182,7 +182,7 @@ def test_a_turned_history_gives_the_turned_stress(law: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize("law", ["j2", "mohr-coulomb", "drucker-prager", "lubliner", "erve", "energy-damage"])
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 @given(seed=st.integers(0, 2**31), decade=st.floats(3.0, 15.0))
 def test_plastic_flow_dissipates(law: str, seed: int, decade: float) -> None:
     """Effective stress times plastic strain increment is not negative, to rounding. Damage that grows dissipates too.

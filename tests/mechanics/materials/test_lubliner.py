@@ -213,7 +213,7 @@ def test_triaxial_compression_follows_its_closed_form(cell, kc, word):
     np.testing.assert_allclose(q, yields + (3 * a + gamma) / (1 - a) * cell, rtol=1e-7)
 
 
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(max_examples=150)
 @given(
     young=st.floats(4, 15),
     nu=st.sampled_from([0.0, 0.2, 0.4999]),

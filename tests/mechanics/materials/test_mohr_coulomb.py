@@ -99,7 +99,7 @@ def test_tangent_matches_finite_differences():
     assert np.percentile(errors, 96) < 1e-5
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(
     young=st.floats(3, 15),
     nu=st.sampled_from([0.0, 0.3, 0.4999]),
