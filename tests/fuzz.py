@@ -336,10 +336,8 @@ def make_stock(stock: Path) -> None:
     made("dem-run", stock / "scenes/particles.toml", "-o", art / "bed.nc", "-q")
     made("homogenize", art / "blocks.nc", "--radius", "1 m", "-o", art / "curves.nc", "-q")
     made("wear-estimate", stock / "scenes/wear.toml", "-o", art / "wear.nc", "-q")
-    quick = settings(["search=dds", "generations=5", "starts=1", "refine=1"])
-    answer = call("calibrate", stock / "scenes/calibrate.toml", *quick, "-o", art / "calibration.nc", "-q", seconds=600)
-    if answer.code:
-        made("calibrate", stock / "scenes/calibrate.toml", "-o", art / "calibration.nc", "-q")
+    quick = settings(["swarm.starts=1", "swarm.particles=6", "swarm.generations=4", "refine.best=1", "refine.iterations=3"])
+    made("calibrate", stock / "scenes/calibrate.toml", *quick, "-o", art / "calibration.nc", "-q")
     for path in [p for p in art.iterdir() if p.suffix != ".nc"]:
         shutil.rmtree(path) if path.is_dir() else path.unlink()
     shutil.copy(PIPELINES / "upscaling/reference/udec_voronoi_granite_fit.csv", stock / "curves.csv")
@@ -364,7 +362,7 @@ def small_text(scene: Path, overrides: list[str]) -> str:
                 inside = line.strip() == head
             if not (inside and line.partition("=")[0].strip() == last):
                 lines.append(line)
-            if line.strip() == head:
+            if head and line.strip() == head:
                 lines.append(f"{last} = {value}")
         if not tables:
             lines.insert(0, f"{last} = {value}")
