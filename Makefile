@@ -12,6 +12,8 @@ FIDELITY ?= standard
 # The order of the tests, another each time so that none leans on another.
 SEED   := $(or $(SEED),$(shell date +%s))
 # Runs that do not wait for one another go side by side.
+TRIES  ?= 20000
+SECONDS ?= 1500
 JOBS   ?= $(shell nproc)
 ifeq ($(MAKELEVEL),0)
 MAKEFLAGS += -j$(JOBS)
@@ -47,6 +49,10 @@ test: $(READY) ## the tests in random order (under 12 minutes, compilation inclu
 .PHONY: matrix
 matrix: $(READY) ## the tests in other orders, threads, Pythons, versions, beside a load (an hour; ROWS="lowest busy")
 	$(BIN)/python tests/matrix.py $(ROWS)
+
+.PHONY: fuzz
+fuzz: $(READY) ## damaged inputs of every kind are read or refused (at most TRIES tries and SECONDS seconds)
+	$(BIN)/python -m tests.fuzz --tries $(TRIES) --seconds $(SECONDS)
 
 .PHONY: verify
 verify: $(READY) ## the long verification against closed forms

@@ -1,6 +1,6 @@
 """The tests in every setting that must not matter: order, distribution, threads, processor, load, Python, versions.
 
-    python tests/matrix.py            # all rows, about five minutes each; what has passed at this commit is not repeated
+    python tests/matrix.py            # all rows, five minutes each; passed ones are not repeated
     python tests/matrix.py lowest py3.13
 
 Environments lie in .matrix/, results in results/matrix.jsonl. Exit code 1 where a row failed.
@@ -26,7 +26,7 @@ TWO = ("-n", "2", "--dist", "loadfile")
 
 @dataclass(frozen=True)
 class Row:
-    """python: version, "" for this one. install: arguments of `uv pip install`. load: busy processes beside the tests."""
+    """python: version, "" for this one. install: arguments of `uv pip install`. load: busy processes beside."""
 
     seed: int = 1
     options: tuple[str, ...] = TWO
@@ -46,7 +46,7 @@ ROWS = {
     "haswell": Row(seed=6, variables={"OPENBLAS_CORETYPE": "Haswell"}),
     "any-core": Row(seed=7, variables={"OPENBLAS_CORETYPE": "", "OPENBLAS_L2_SIZE": ""}),
     "threads-1": Row(seed=8, variables=_ONE_THREAD),
-    "threads-2": Row(seed=9, variables={name: "2" for name in _ONE_THREAD}),
+    "threads-2": Row(seed=9, variables=dict.fromkeys(_ONE_THREAD, "2")),
     "busy": Row(seed=10, load=6),
     "py3.12": Row(seed=11, python="3.12"),
     "py3.13": Row(seed=12, python="3.13"),
@@ -71,7 +71,10 @@ def main() -> int:
             with RESULTS.open("a") as file:
                 file.write(json.dumps(done[name]) + "\n")
         result = done[name]
-        print(f"{name:10} {'passed' if result['passed'] else 'FAILED'} {result['minutes']:5.1f} min  {result['said']}", flush=True)
+        print(
+            f"{name:10} {'passed' if result['passed'] else 'FAILED'} {result['minutes']:5.1f} min  {result['said']}",
+            flush=True,
+        )
     return 0 if all(done[n]["passed"] for n in names) else 1
 
 
@@ -82,7 +85,9 @@ def _run(name: str, row: Row) -> dict[str, object]:
     # A cold start: kernels of another row, compiled on the same machine, would hide what this one compiles.
     cache = HOME / "cache" / name
     shutil.rmtree(cache, ignore_errors=True)
-    environment = os.environ | row.variables | {"XDG_CACHE_HOME": str(cache), "PATH": f"{python.parent}:{os.environ['PATH']}"}
+    environment = (
+        os.environ | row.variables | {"XDG_CACHE_HOME": str(cache), "PATH": f"{python.parent}:{os.environ['PATH']}"}
+    )
     environment = {k: v for k, v in environment.items() if v}
     call = [python, "-m", "pytest", "-m", "not verify", f"--randomly-seed={row.seed}", *row.options]
     log = HOME / f"{name}.log"

@@ -1,0 +1,46 @@
+"""One try, and a process that makes tries until it dies of one."""
+
+from __future__ import annotations
+
+import faulthandler
+import importlib
+import pkgutil
+import random
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import graben
+from tests.conftest import ROOT
+from tests.fuzz.families import FAMILIES
+from tests.fuzz.stock import make_artifacts
+
+
+def one(family: str, seed: int, number: int, stock: Path, keep: bool = False) -> None:
+    folder = Path(tempfile.mkdtemp(prefix="fuzz-"))
+    try:
+        FAMILIES[family][0](random.Random(f"{family}:{seed}:{number}"), stock, folder)
+    except BaseException:
+        if keep:
+            kept = ROOT / "results/fuzz" / f"{family}-{seed}-{number}"
+            shutil.rmtree(kept, ignore_errors=True)
+            shutil.copytree(folder, kept)
+        raise
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def worker(pipe: Any, stock: Path) -> None:
+    """Take tries from the pipe, and say how each ended."""
+    faulthandler.enable()
+    # An interrupt within an import leaves half a module, which later tries in this process would stumble over.
+    for module in pkgutil.walk_packages(graben.__path__, "graben."):
+        importlib.import_module(module.name)
+    make_artifacts(Path(tempfile.mkdtemp(dir=stock.parent)), stock / "scenes")
+    while (task := pipe.recv()) is not None:
+        try:
+            one(*task, stock, keep=True)
+            pipe.send(None)
+        except BaseException as error:
+            pipe.send(f"{type(error).__name__}: {error}")
