@@ -15,7 +15,7 @@ ALLOWED = {
     "mechanics": {"mechanics"},
 }
 # What mechanics may use beside itself and the standard library (cmaes is optional, imported where it is used).
-MECHANICS_LIBRARIES = {"numpy", "scipy", "numba", "llvmlite", "cmaes"}
+MECHANICS_LIBRARIES = {"numpy", "scipy", "numba", "llvmlite", "cmaes", "shapely"}
 STRANGERS = {"blocks", "particles", "averaging", "wear"}
 
 

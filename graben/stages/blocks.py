@@ -13,19 +13,17 @@ from graben.mechanics.blocks import snapshot
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.history import History
 from graben.mechanics.blocks.in_situ import InSitu, put_in
-from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets
-from graben.mechanics.blocks.mending import mend
 from graben.mechanics.blocks.model import BlockModel, Damping
 from graben.mechanics.blocks.plastic_zones import Strength
-from graben.mechanics.blocks.tessellation import Tessellation, voronoi_blocks, without
+from graben.mechanics.blocks.tessellation import Tessellation
 from graben.schemas.artifact import write_artifact
 from graben.schemas.files import together
 from graben.schemas.layouts.blocks import LAYOUT
 from graben.schemas.outputs import CHECKPOINT, PARTIAL, SERIES, Outputs, beside
-from graben.schemas.polygon_file import read_polygons
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.stages import blocks_checkpoint
 from graben.stages.blocks_biaxial import Biaxial
+from graben.stages.blocks_geometry import Ground, lay_out
 from graben.stages.blocks_joints import joints_of_sets
 from graben.stages.blocks_output import write_vtk
 from graben.stages.blocks_programme import Rising
@@ -38,9 +36,6 @@ FIDELITY = {"draft": 12_500, "standard": 50_000, "reference": 200_000}
 
 # How a loading went that follows a force check.
 _PACED = ("loading_steps", "force_check_worst", "force_check_mean")
-
-# Slivers of given or cut blocks are mended below this share of tessellation.edge.
-_MENDED = 0.1
 
 
 def outputs_of(scene: BlocksScene, output: Path) -> Outputs:
@@ -64,10 +59,10 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
     written as NAME.partial.nc beside the output.
     """
     prepared = prepare(scene)
-    tessellation, model, test = prepared.tessellation, prepared.model, prepared.test
+    ground, model, test = prepared.ground, prepared.model, prepared.test
     record = Record.begin(scene)
     parts = blocks_checkpoint.read(output, scene) if restart else None
-    progress(0.0, f"{tessellation.size} blocks come to rest")
+    progress(0.0, f"{ground.blocks.size} blocks come to rest")
     if parts is None:
         test.begin(progress)
     history = History(model, scene.output.balance)
@@ -85,10 +80,12 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
     except (NumericsFailed, KeyboardInterrupt) as stop:
         keeper.stopped()
         if history.time and isinstance(stop, NumericsFailed):
-            write_artifact(beside(output, PARTIAL), LAYOUT, _arrays(model, history, test), record)
+            arrays = ground.placed(_arrays(model, history, test))
+            write_artifact(beside(output, PARTIAL), LAYOUT, arrays, record)
         raise
     arrays = _arrays(model, history, test)
-    headline = test.headline(arrays)
+    headline = test.headline(arrays) | ground.mended
+    arrays = ground.placed(arrays)
     record.cost |= {
         "steps": model.steps_done,
         "consolidation_steps": int(test.rest[1]),
@@ -101,7 +98,9 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         "consolidation_unbalanced_force_ratio": float(test.rest[0]),
         "largest_overlap_m": max(history.overlap),
         **{name: headline[name] for name in (*test.ERRORS, *_PACED) if name in headline},
-        **{f"block_{name}": value for name, value in tessellation.statistics().items()},
+        **{f"block_{name}": value for name, value in ground.blocks.statistics().items()},
+        **ground.mended,
+        **({"local_origin_m": ground.origin.tolist()} if ground.origin.any() else {}),
     }
     try:
         with together():
@@ -119,7 +118,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
 class Prepared:
     """A checked scene whose work has not begun."""
 
-    tessellation: Tessellation
+    ground: Ground
     model: BlockModel
     test: Biaxial | Rising
     sizes: list[Estimate]
@@ -141,14 +140,16 @@ def prepare(scene: BlocksScene) -> Prepared:
         raise BadInput(Fault(str(file), "loading.states", str(scene.loading.states), expected))
     duration = scene.loading.duration if programme is None else programme.end
     gravity = (0.0, 0.0) if programme is None else (programme.horizontal, programme.vertical)
+    ground = lay_out(scene)
+    scene = ground.scene
     try:
-        tessellation = _tessellation(scene)
-        model = _model(scene, tessellation, duration / steps, gravity)
+        model = _model(scene, ground.blocks, duration / steps, gravity)
         _put_stress_in(scene, model)
         test = Biaxial(scene, model, steps) if programme is None else Rising(scene, model, steps)
     except Refused as error:
-        raise BadInput(Fault(str(file), "", "", f"a scene that can be run ({error})")) from error
-    return Prepared(tessellation, model, test, sizes)
+        key = "loading" if programme is None else "programme"
+        raise BadInput(Fault(str(file), key, "", str(error))) from error
+    return Prepared(ground, model, test, sizes)
 
 
 def _bring_back(
@@ -160,22 +161,6 @@ def _bring_back(
         history.bring_back(parts["history"])
     except Refused as error:
         raise BadInput(Fault(str(path), "--restart", "", f"a checkpoint of this model ({error})")) from error
-
-
-def _tessellation(scene: BlocksScene) -> Tessellation:
-    t = scene.tessellation
-    outline = np.array(scene.domain.corners)
-    if t.method == "voronoi":
-        blocks = voronoi_blocks(outline, t.edge, scene.seed, t.lloyd_passes, t.shortest_edge)
-    else:
-        if t.file is not None and t.method == "file":
-            shapes, marks = read_polygons(t.file)
-        else:
-            sets = [JointSet(s.dip, s.spacing, s.persistence, s.dip_scatter, s.spacing_scatter) for s in t.sets]
-            shapes, marks = (list(part) for part in zip(*cut_by_sets(outline, sets, scene.seed)))
-        limits = [_MENDED * t.edge if given is None else given for given in (t.shortest_edge, t.thinnest)]
-        blocks = mend(shapes, marks if scene.joints.sets else None, shortest=limits[0], thinnest=limits[1])
-    return without(blocks, [np.array(hole) for hole in scene.domain.holes])
 
 
 def _model(scene: BlocksScene, tessellation: Tessellation, dt: float, gravity: tuple[float, float]) -> BlockModel:
@@ -204,7 +189,7 @@ def _put_stress_in(scene: BlocksScene, model: BlockModel) -> None:
     s = scene.in_situ
     if s is None:
         return
-    level = max(y for _, y in scene.domain.corners) if s.level is None else s.level
+    level = float(model.bodies.outline[:, 1].max()) if s.level is None else s.level
     stress, rise = (s.sxx, s.syy, s.sxy), (s.sxx_rise, s.syy_rise, s.sxy_rise)
     if s.k0 is not None and scene.programme is not None:
         weight = -scene.rock.density * scene.programme.vertical

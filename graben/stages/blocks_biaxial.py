@@ -110,12 +110,12 @@ class Biaxial:
         """Peak of the top wall's mean stress (Pa, compression negative), nominal strain there, error measures."""
         sides = rectangle_sides(self.model.bodies.outline)
         push = arrays["wall_reaction"]
-        size = np.ptp(self.model.bodies.outline, axis=0)
+        low, size = self.model.bodies.outline.min(axis=0), np.ptp(self.model.bodies.outline, axis=0)
         vertical = push[:, sides.top, 1] / size[0]
         peak = int(np.argmin(vertical))
         bodies, area, stress = self.model.bodies, self.model.zone_area, arrays["zone_stress"]
         middle = arrays["vertex_position"][bodies.zone_vertex].mean(axis=1)
-        inside = np.hypot(*(middle - size / 2.0).T) < 0.4 * size.min()
+        inside = np.hypot(*(middle - (low + size / 2.0)).T) < 0.4 * size.min()
         if "block_stress" in arrays:
             stress = arrays["block_stress"][:, bodies.zone_block]
         lateral = mean_stress(stress, area, inside if inside.any() else area > 0.0)[:, 0]

@@ -87,13 +87,14 @@ class Rising:
             self._save(save)
         if not self.loads.direction.any() and not self._digs:
             return
-        while rise.load_time < p.end * (1.0 - 1e-9) and not rise.failed:
+        end = p.end * (1.0 - 1e-9)
+        while rise.load_time < end and not rise.failed:
             if rise.waited == 0:
                 self.carried = m.motion.x.copy()
             stop = self._dig(history, save)
             mechanics.look_at(m, rise, self.control, self.loads, p.end, history.reference, stop)
             self.looks.append((rise.load_time, rise.settlement, rise.imbalance))
-            if rise.failed or rise.load_time >= self.next_save:
+            if rise.failed or rise.load_time >= min(end, self.next_save):
                 self._save(save)
             wait = f", waiting for {rise.waited} steps" if rise.waited else ""
             progress(
@@ -192,10 +193,12 @@ class Rising:
         vertex, where = np.concatenate(found), np.concatenate(arc)
         return vertex[np.lexsort((vertex, where))].astype(np.int32)
 
-    def _inertia(self, arrays: dict[str, np.ndarray]) -> float:
+    def _inertia(self, arrays: dict[str, np.ndarray]) -> float | None:
         """What supports and weight leave of the change of load: root mean square of the shares, first and last
-        states aside."""
+        states aside; None where there are no others."""
         times = arrays["load_time"][1:-1]
+        if not len(times):
+            return None
         load = np.zeros((len(times), 2))
         for force, course in self.loads.patterns[: len(self.programme.loads)]:
             load += np.outer([course.at(t) - course.at(0.0) for t in times], force.sum(axis=0))

@@ -31,10 +31,10 @@ class Sides:
 
 
 def rectangle_sides(outline: np.ndarray) -> Sides:
-    """Sides of an upright rectangle (4, 2), counter-clockwise; ValueError for anything else."""
+    """Sides of an upright rectangle (4, 2), counter-clockwise; Refused for anything else."""
     d = np.roll(outline, -1, axis=0) - outline
-    if len(outline) != 4 or np.any(np.abs(d[:, 0] * d[:, 1]) > 1e-9 * np.abs(d).max() ** 2):
-        raise Refused("biaxial compression needs an upright rectangle as domain")
+    if len(outline) != 4 or np.any(np.abs(d[:, 0] * d[:, 1]) > 1e-6 * np.abs(d).max() ** 2):
+        raise Refused("an upright rectangle as domain of biaxial compression")
     return Sides(int(np.argmax(d[:, 0])), int(np.argmax(d[:, 1])), int(np.argmin(d[:, 0])), int(np.argmin(d[:, 1])))
 
 

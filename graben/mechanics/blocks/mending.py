@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -20,15 +21,17 @@ from graben.errors import Refused
 from graben.mechanics.blocks import polygons
 from graben.mechanics.blocks.tessellation import (
     Marks,
+    Mending,
     Tessellation,
-    collapse_short_edges,
+    collapsed,
     edge_key,
     edges_of,
     from_rings,
     shared_points,
 )
 
-_STRAIGHT = 1e-6
+# A joint that turns by less has kept its direction [rad].
+_TURNED = np.radians(0.1)
 
 
 def mend(
@@ -39,7 +42,7 @@ def mend(
     thinnest: float,
     smallest: float = 0.02,
 ) -> Tessellation:
-    """Blocks from polygons (m, 2) [m] that fill a domain without overlaps. ValueError where they do not.
+    """Blocks from polygons (m, 2) [m] that fill a domain without overlaps. Refused where they do not.
 
     edge_sets : for each polygon the sets of joints (m,) of the edges from each corner to the next; None: one set
     shortest, thinnest : [m]; smallest : share of the median area
@@ -47,23 +50,38 @@ def mend(
     given = [np.asarray(s, float) for s in shapes]
     shapes = [s if polygons.signed_area(s) > 0.0 else s[::-1] for s in given]
     for k, shape in enumerate(shapes):
-        if len(shape) < 3 or not polygons.is_simple(shape):
-            raise Refused(f"polygon {k} is no simple polygon")
+        try:
+            polygons.refuse_crossing(shape)
+        except Refused as error:
+            raise Refused(f"polygon {k}: {error}") from None
     points, rings = shared_points(shapes)
     marks = None if edge_sets is None else _marks(points, given, edge_sets)
     rings = _with_hanging_points(points, rings, marks)
     _refuse_overlaps(points, rings)
-    rings = _merge_slivers(points, rings, thinnest, smallest)
-    outline = outer_boundary(points, rings)
-    blocks = from_rings(points, rings, outline, marks)
-    if shortest > 0.0:
-        blocks = collapse_short_edges(blocks, shortest, given=True)
-    turning = [_turning(blocks.points, ring) for ring in blocks.rings]
-    marks = blocks.marks
+    left = _merge_slivers(points, rings, thinnest, smallest)
+    outline = outer_boundary(points, list(left.values()))
+    merged = [k for k in range(len(rings)) if k not in left]
+    area = sum(polygons.signed_area(points[rings[k]]) for k in merged)
+    blocks = from_rings(points, list(left.values()), outline, marks)
+    points, rings, marks, became = collapsed(blocks, shortest, given=True)
+    turning = [_turning(points, ring) for ring in rings]
     if marks is not None:
-        for ring, kept in zip(blocks.rings, turning):
-            _mark_straight_runs(blocks.points, ring, set(kept), marks)
-    return from_rings(blocks.points, turning, outline, marks)
+        for ring, kept in zip(rings, turning):
+            _mark_straight_runs(points, ring, set(kept), marks)
+    moves = _moves(blocks, points, became)
+    return replace(from_rings(points, turning, outline, marks), mending=Mending(*moves, len(merged), float(area)))
+
+
+def _moves(blocks: Tessellation, points: np.ndarray, became: np.ndarray) -> tuple[int, float, int, float]:
+    """Corners moved, largest move [m], joints turned, largest turn [rad]; each point became one of `points`."""
+    far = np.hypot(*(points[became] - blocks.points).T)
+    edge = np.array(sorted({edge_key(*e) for ring in blocks.rings for e in edges_of(ring)}))
+    edge = edge[became[edge[:, 0]] != became[edge[:, 1]]]
+    before, after = (x[edge[:, 1]] - x[edge[:, 0]] for x in (blocks.points, points[became]))
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    turn = np.abs(np.arctan2(cross, (before * after).sum(axis=1)))
+    size = float(np.ptp(blocks.points, axis=0).max())
+    return int((far > 1e-9 * size).sum()), float(far.max()), int((turn > _TURNED).sum()), float(turn.max())
 
 
 def _marks(points: np.ndarray, shapes: list[np.ndarray], edge_sets: list[np.ndarray]) -> Marks:
@@ -116,7 +134,7 @@ def outer_boundary(points: np.ndarray, rings: list[list[int]]) -> np.ndarray:
         if area > largest:
             best, largest = xy, area
     if best is None:
-        raise Refused("the polygons have no outer boundary")
+        raise Refused("polygons with an outer boundary")
     return best
 
 
@@ -126,7 +144,7 @@ def _turning(points: np.ndarray, ring: list[int]) -> list[int]:
     back, ahead = xy - np.roll(xy, 1, axis=0), np.roll(xy, -1, axis=0) - xy
     cross = back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0]
     size = np.hypot(*back.T) * np.hypot(*ahead.T)
-    kept = [p for p, c, s in zip(ring, cross, size) if abs(c) > _STRAIGHT * s]
+    kept = [p for p, c, s in zip(ring, cross, size) if abs(c) > polygons.STRAIGHT * s]
     return kept if len(kept) > 2 else ring
 
 
@@ -163,15 +181,16 @@ def _refuse_overlaps(points: np.ndarray, rings: list[list[int]]) -> None:
     for k, ring in enumerate(rings):
         for edge in edges_of(ring):
             if edge in seen:
-                raise Refused(f"polygons {seen[edge]} and {k} overlap")
+                raise Refused(f"polygons that do not overlap (polygons {seen[edge]} and {k} do)")
             seen[edge] = k
     total = sum(polygons.signed_area(points[ring]) for ring in rings)
     hull = float(np.prod(np.ptp(points, axis=0)))
     if total > hull * (1.0 + 1e-6):
-        raise Refused("polygons overlap: their areas add up to more than the box around them")
+        raise Refused("polygons that do not overlap (their areas add up to more than the box around them)")
 
 
-def _merge_slivers(points, rings, thinnest: float, smallest: float) -> list[list[int]]:
+def _merge_slivers(points, rings, thinnest: float, smallest: float) -> dict[int, list[int]]:
+    """The rings that are left, by the numbers of the given ones."""
     area = np.array([polygons.signed_area(points[r]) for r in rings])
     limit = smallest * float(np.median(area))
     alive: dict[int, list[int]] = dict(enumerate(rings))
@@ -198,7 +217,7 @@ def _merge_slivers(points, rings, thinnest: float, smallest: float) -> list[list
             alive[other] = merged
             del alive[k]
             break
-    return [alive[k] for k in sorted(alive)]
+    return {k: alive[k] for k in sorted(alive)}
 
 
 def _union(a: list[int], b: list[int]) -> list[int] | None:

@@ -37,7 +37,7 @@ def on_segment(bodies: Bodies, start: np.ndarray, end: np.ndarray) -> np.ndarray
 def pressure_forces(bodies: Bodies, start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Vertex forces (vertices, 2) [N/m] of a pressure of 1 Pa on the part of the outline along a segment.
 
-    Edges that the segment covers in part take their part, with its moment. ValueError when it covers none.
+    Edges that the segment covers in part take their part, with its moment. Refused when it covers none.
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     d = end - start
@@ -52,7 +52,7 @@ def pressure_forces(bodies: Bodies, start: np.ndarray, end: np.ndarray) -> np.nd
     beside = (off < 1e-6 * size) & (np.minimum(sp, sq) < length) & (np.maximum(sp, sq) > 0.0)
     a, b, sp, sq = a[beside], b[beside], sp[beside], sq[beside]
     if len(a) == 0:
-        raise Refused(f"no part of the outline lies on the segment from {tuple(start)} to {tuple(end)}")
+        raise Refused("a segment on the outline; no part of the outline lies on it")
     # Covered part of each edge, as fractions of it from its first vertex.
     f0, f1 = np.clip((0.0 - sp) / (sq - sp), 0.0, 1.0), np.clip((length - sp) / (sq - sp), 0.0, 1.0)
     f0, f1 = np.minimum(f0, f1), np.maximum(f0, f1)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import heapq
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -43,12 +43,25 @@ def edges_of(ring: list[int]) -> Iterator[tuple[int, int]]:
 
 
 @dataclass(frozen=True)
+class Mending:
+    """What mending moved: corners and the farthest of their moves [m], joints turned and the largest turn [rad],
+    blocks merged into others and their area [m2]."""
+
+    corners: int = 0
+    largest_move: float = 0.0
+    joints: int = 0
+    largest_turn: float = 0.0
+    blocks: int = 0
+    area: float = 0.0
+
+
+@dataclass(frozen=True)
 class Tessellation:
     """Blocks that fill an outline; blocks share points here, and part when zones are made.
 
     points : (p, 2) [m]; start : (blocks + 1,); corner : indices into points, counter-clockwise per block;
     outline : (m, 2) [m] counter-clockwise; edge_set : (corners,) set of joints of the edge from each corner to the
-    next, None: all of set 0.
+    next, None: all of set 0; mending : what was moved to make blocks of given or cut polygons.
     """
 
     points: np.ndarray
@@ -56,6 +69,7 @@ class Tessellation:
     corner: np.ndarray
     outline: np.ndarray
     edge_set: np.ndarray | None = None
+    mending: Mending | None = None
 
     @property
     def rings(self) -> list[list[int]]:
@@ -113,9 +127,8 @@ def voronoi_blocks(
     """
     outline = np.asarray(outline, dtype=float)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
-        raise ValueError(f"outline: expected (m, 2) with m >= 3, found shape {outline.shape}")
-    if not polygons.is_simple(outline):
-        raise Refused("outline: two of its sides cross or touch")
+        raise Refused(f"outline: expected (m, 2) with m >= 3, found shape {outline.shape}")
+    polygons.refuse_crossing(outline)
     area = polygons.signed_area(outline)
     if area < 0.0:
         outline, area = outline[::-1].copy(), -area
@@ -149,7 +162,8 @@ def without(tessellation: Tessellation, holes: list[np.ndarray]) -> Tessellation
     if gone.all():
         raise Refused("holes: no block is left")
     rings = [ring for ring, out in zip(tessellation.rings, gone) if not out]
-    return from_rings(points, rings, tessellation.outline, tessellation.marks)
+    left = from_rings(points, rings, tessellation.outline, tessellation.marks)
+    return replace(left, mending=tessellation.mending)
 
 
 def _random_points(outline: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:
@@ -191,7 +205,7 @@ def _cells(seeds: np.ndarray, outline: np.ndarray):
 
 def _conforming(points, start, corner, outline, check: bool = True) -> Tessellation:
     """Give equal points one number, and drop repeated corners."""
-    number, first = _equal_points(points, 1e-7 * float(np.ptp(outline, axis=0).max()))
+    number, first = equal_points(points, 1e-7 * float(np.ptp(outline, axis=0).max()))
     rings = [_without_repeats(number[corner[a:b]].tolist()) for a, b in itertools.pairwise(start)]
     if check and min(len(r) for r in rings) < 3:
         raise Refused("tessellation: a block has fewer than three corners")
@@ -206,12 +220,12 @@ def shared_points(shapes: list[np.ndarray]) -> tuple[np.ndarray, list[list[int]]
     """Points (p, 2) of polygons (m, 2), equal ones once, and each polygon's corners as numbers of points."""
     points = np.vstack(shapes)
     tolerance = 1e-7 * float(np.ptp(points, axis=0).max())
-    number, first = _equal_points(points, tolerance)
+    number, first = equal_points(points, tolerance)
     ends = np.cumsum([len(s) for s in shapes])[:-1]
     return points[first], [_without_repeats(r.tolist()) for r in np.split(number, ends)]
 
 
-def _equal_points(points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+def equal_points(points: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
     """The number of each point among the different ones, and the first of each of these."""
     pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
     n = len(points)
@@ -245,9 +259,18 @@ def collapse_short_edges(tessellation: Tessellation, shortest: float, given: boo
     given : the blocks did not come from a Voronoi diagram. They may have such corners from the start: a collapse must
     not add to them; and the ends may meet at one of them.
     """
+    points, rings, marks, _ = collapsed(tessellation, shortest, given)
+    return from_rings(points, rings, tessellation.outline, marks)
+
+
+def collapsed(
+    tessellation: Tessellation, shortest: float, given: bool
+) -> tuple[np.ndarray, list[list[int]], Marks | None, np.ndarray]:
+    """Points, rings and sets of joints after `collapse_short_edges`, and the point (p,) that each point became."""
     points = tessellation.points.copy()
     outline = tessellation.outline
     rings, marks = tessellation.rings, tessellation.marks
+    became = np.arange(len(points))
     tolerance = 1e-6 * float(np.ptp(outline, axis=0).max())
     on_side = polygons.distance_to_sides(points, outline) < tolerance
     sides = [frozenset(np.flatnonzero(row).tolist()) for row in on_side]
@@ -293,6 +316,7 @@ def collapse_short_edges(tessellation: Tessellation, shortest: float, given: boo
             points[i], points[j] = before
             continue
         alive[j] = False
+        became[became == j] = i
         if marks is not None:
             for b in blocks_at[j]:
                 k = rings[b].index(j)
@@ -306,7 +330,7 @@ def collapse_short_edges(tessellation: Tessellation, shortest: float, given: boo
             k = ring.index(i)
             push(i, ring[k - 1])
             push(i, ring[(k + 1) % len(ring)])
-    return from_rings(points, rings, outline, marks)
+    return points, rings, marks, became
 
 
 def _joined(rings, blocks_at, i: int, j: int) -> bool:
