@@ -193,12 +193,12 @@ class Rising:
         vertex, where = np.concatenate(found), np.concatenate(arc)
         return vertex[np.lexsort((vertex, where))].astype(np.int32)
 
-    def _inertia(self, arrays: dict[str, np.ndarray]) -> float | None:
+    def _inertia(self, arrays: dict[str, np.ndarray]) -> float:
         """What supports and weight leave of the change of load: root mean square of the shares, first and last
-        states aside; None where there are no others."""
+        states aside; nan where there are no others."""
         times = arrays["load_time"][1:-1]
         if not len(times):
-            return None
+            return math.nan
         load = np.zeros((len(times), 2))
         for force, course in self.loads.patterns[: len(self.programme.loads)]:
             load += np.outer([course.at(t) - course.at(0.0) for t in times], force.sum(axis=0))

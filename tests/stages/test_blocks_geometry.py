@@ -221,12 +221,11 @@ def test_lateral_stress_is_taken_from_the_middle_of_the_map_wherever_it_lies(tmp
     assert shares[1:] == pytest.approx(shares[:1] * 2, rel=1e-3)
 
 
-def test_the_state_at_the_end_is_saved_and_what_few_states_cannot_tell_is_none(tmp_path):
+def test_the_state_at_the_end_is_saved_and_what_few_states_cannot_tell_is_nan(tmp_path):
     path = bench(tmp_path, more="excavations = []")
     for every, times in (("100 s", [0.0, 10.0]), ("4 s", [0.0, 4.0, 8.0, 10.0])):
         output = tmp_path / f"{len(times)}.nc"
         headline = dem_run.run(path, output, overrides=[f'programme.save_every="{every}"'])
         assert read_artifact(output, "blocks").load_time.values == pytest.approx(times, rel=0.2)
-        known = [headline[name] is not None for name in ("kinetic_over_stored_energy", "inertia_over_load")]
+        known = [bool(np.isfinite(headline[name])) for name in ("kinetic_over_stored_energy", "inertia_over_load")]
         assert known == [len(times) > 2] * 2
-        json.dumps(headline, allow_nan=False)
