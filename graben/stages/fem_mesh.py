@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
 
 from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.continuum.mapped import mapped_mesh
-from graben.mechanics.continuum.mesh2d import QuadMesh, orient
+from graben.mechanics.continuum.mesh2d import QuadMesh
+from graben.mechanics.continuum.one_body import NotOneBody, one_body
 from graben.mechanics.continuum.paved import paved_mesh
 from graben.mechanics.continuum.sizing import SizeField
+from graben.schemas.mesh_file import read_plane_mesh
 from graben.schemas.scenes.fem import FemScene
 
+_log = logging.getLogger(__name__)
 
-def mesh_of(scene: FemScene) -> QuadMesh:
-    """Build or read the mesh.
+
+def mesh_of(scene: FemScene) -> tuple[QuadMesh, list[str]]:
+    """Build or read the mesh; the notes say what of a file was left out or mended.
 
     Raises
     ------
@@ -30,8 +35,8 @@ def mesh_of(scene: FemScene) -> QuadMesh:
     key = "mesh.outline" if mesh.method == "paved" else "mesh.patches"
     try:
         if mesh.method == "paved":
-            return paved_mesh(shape, size)
-        return mapped_mesh(shape, np.array(mesh.patches, dtype=np.int64), size)
+            return paved_mesh(shape, size), []
+        return mapped_mesh(shape, np.array(mesh.patches, dtype=np.int64), size), []
     except Refused as error:
         raise BadInput(Fault(file, key, "", f"a domain that can be meshed ({error})")) from None
 
@@ -48,27 +53,21 @@ def size_field(scene: FemScene) -> SizeField:
     )
 
 
-def read_quads(path: Path) -> QuadMesh:
-    """4-node quads of a mesh file in any format that meshio reads; other cells are ignored.
+def read_quads(path: Path) -> tuple[QuadMesh, list[str]]:
+    """The body of quads in a mesh file, and notes on what was left out or mended.
 
     Raises
     ------
-    BadInput : not readable, no quads, not plane, or elements that are not convex
+    BadInput : not readable, cells of another kind, not plane, or not one body of convex quads
     """
-    import meshio
-
+    found = read_plane_mesh(path)
     try:
-        read = meshio.read(path)
-    except (SystemExit, Exception) as error:  # meshio raises many kinds, and exits on an unknown suffix
-        raise BadInput(Fault(str(path), "", "", f"a mesh file that meshio reads ({error})")) from None
-    blocks = [cells.data for cells in read.cells if cells.type == "quad"]
-    if not blocks:
-        found = ", ".join(sorted({c.type for c in read.cells})) or "no cells"
-        raise BadInput(Fault(str(path), "cells", found, "4-node quads"))
-    points = np.asarray(read.points, dtype=float)
-    if points.shape[1] == 3 and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points[:, :2], axis=0).max():
-        raise BadInput(Fault(str(path), "points", "z varies", "a plane mesh in x and y"))
-    try:
-        return orient(points, np.concatenate(blocks))
-    except Refused as error:
-        raise BadInput(Fault(str(path), "cells", "", f"convex quads ({error})")) from None
+        mesh, mended = one_body(found.points, found.quads, found.numbers)
+    except NotOneBody as error:
+        raise BadInput(
+            [Fault(str(path), "cells", "", f"one body of quads ({fault})") for fault in error.faults]
+        ) from None
+    notes = [*found.notes, *mended]
+    for note in notes:
+        _log.info("%s: %s", path.name, note)
+    return mesh, notes

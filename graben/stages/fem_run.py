@@ -38,6 +38,7 @@ class Problem:
     ----------
     steady, rising : (2 n,) nodal loads: applied with gravity, and per second after it
     unit_pressure : (2 n,) nodal loads of 1 Pa on the first rising load's segment; loaded_length its length, m
+    notes : what of a mesh file was left out or mended
     """
 
     body: Body
@@ -48,6 +49,7 @@ class Problem:
     loaded_length: float
     rate: float
     offset: float
+    notes: tuple[str, ...] = ()
 
     def external(self, time: float) -> np.ndarray:
         """Nodal loads (2 n,), N/m, at a load time after gravity, s."""
@@ -73,7 +75,8 @@ def run(
     -------
     headline numbers: failure_load_pa (None when the end was reached without failure), failed, largest_load_pa,
     settlement_m of the loaded segment, compliance_ratio and stiffness_ratio (evidence of collapse), elements,
-    steps, energy_error, stabilisation_share (work of the viscous forces over that of the loads)
+    steps, energy_error, stabilisation_share (work of the viscous forces over that of the loads), and mesh_notes where
+    something of a mesh file was left out or mended
 
     Raises
     ------
@@ -87,6 +90,8 @@ def run(
     progress(0.0, "meshing")
     problem, inputs, _ = prepare(scene, material)
     record = Record.begin(scene, inputs)
+    notes = {"mesh_notes": list(problem.notes)} if problem.notes else {}
+    record.cost |= notes
     body = problem.body
     progress(0.01, f"{len(body.mesh.quads)} elements; gravity")
     newton = NewtonOptions(scene.stepping.tolerance, scene.stepping.max_iterations)
@@ -104,7 +109,7 @@ def run(
         )
     loaded = _load_up(scene, problem, settled, newton, history, progress)
     failed = not loaded.complete
-    headline = _headline(scene, problem, settled, loaded, history)
+    headline = _headline(scene, problem, settled, loaded, history) | notes
     record.cost.update(_cost(body, settled, loaded, headline))
     target = last_good if failed and scene.stepping.goal == "end" else output
     progress(0.98, "writing")
@@ -135,22 +140,27 @@ def prepare(scene: FemScene, material: Path | None = None) -> tuple[Problem, lis
     inputs = [] if source is None else [source]
     if scene.mesh.method == "file" and scene.mesh.file is not None:
         inputs.append(scene.mesh.file)
-    mesh = mesh_of(scene)
+    mesh, notes = mesh_of(scene)
     if scene.mesh.method == "file":
         sizes = sizes_of(scene, len(mesh.quads))
         refuse_too_large(file, sizes)
-    return _problem(scene, mesh, Material(law.id, parameters, law.initial_state(parameters))), inputs, sizes
+    problem = _problem(scene, mesh, Material(law.id, parameters, law.initial_state(parameters)))
+    return replace(problem, notes=tuple(notes)), inputs, sizes
 
 
 def _problem(scene: FemScene, mesh: QuadMesh, law: Material) -> Problem:
     file = str(scene.source.path)
     faults: list[Fault] = []
     fixed = np.zeros((len(mesh.points), 2), dtype=bool)
+    outline = np.unique(mesh.boundary_edges())
     support_nodes = []
     for k, support in enumerate(scene.supports):
-        nodes = mesh.nodes_on_segment(np.array(support.start), np.array(support.end))
-        if not len(nodes):
-            faults.append(Fault(file, f"supports.{k}", support.name, "a segment that holds nodes of the mesh"))
+        start, end = np.array(support.start), np.array(support.end)
+        nodes = mesh.nodes_on_segment(start, end)
+        nodes = nodes[np.isin(nodes, outline)]
+        if len(nodes) < (2 if np.any(start != end) else 1):
+            expected = "a segment that holds nodes of the outline, two at least where it has a length"
+            faults.append(Fault(file, f"supports.{k}", support.name, expected + _sizes(scene, mesh)))
         fixed[nodes, 0] |= support.fix in ("x", "both")
         fixed[nodes, 1] |= support.fix in ("y", "both")
         support_nodes.append(nodes)
@@ -164,7 +174,8 @@ def _problem(scene: FemScene, mesh: QuadMesh, law: Material) -> Problem:
         try:
             force, covered = edge_traction(mesh, np.array(load.start), np.array(load.end))
         except Refused as error:
-            faults.append(Fault(file, f"loads.{k}", load.name, f"a segment of the outline ({error})"))
+            expected = f"a segment of the outline ({error})" + _sizes(scene, mesh)
+            faults.append(Fault(file, f"loads.{k}", load.name, expected))
             continue
         steady += load.pressure * force
         rising += load.rate * force
@@ -177,6 +188,17 @@ def _problem(scene: FemScene, mesh: QuadMesh, law: Material) -> Problem:
     except Refused as error:
         raise BadInput(Fault(file, "supports", "", f"supports that leave something free ({error})")) from None
     return Problem(body, support_nodes, steady, rising, unit, length, rate, offset)
+
+
+def _sizes(scene: FemScene, mesh: QuadMesh) -> str:
+    """A hint for a mesh file whose size is far from that of the scene's segments: units slip."""
+    ends = np.array([p for part in (*scene.supports, *scene.loads) for p in (part.start, part.end)], dtype=float)
+    spans = np.ptp(mesh.points, axis=0), np.ptp(ends, axis=0)
+    ratio = spans[0].max() / spans[1].max() if spans[1].max() > 0 else 1.0
+    if scene.mesh.method != "file" or 0.1 < ratio < 10.0:
+        return ""
+    mine, others = (f"{a[0]:g} m x {a[1]:g} m" for a in spans)
+    return f"; the mesh spans {mine}, loads and supports {others}: coordinates of the file are taken as metres"
 
 
 def _holds_still(mesh: QuadMesh, fixed: np.ndarray) -> bool:

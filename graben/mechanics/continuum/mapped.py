@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from graben.errors import Refused
-from graben.mechanics.continuum.mesh2d import QuadMesh, check_mesh
+from graben.mechanics.continuum.mesh2d import QuadMesh
+from graben.mechanics.continuum.one_body import sound
 from graben.mechanics.continuum.sizing import SizeField, distance_to_segment
 
 
@@ -62,7 +63,7 @@ def mapped_mesh(corners: np.ndarray, patches: np.ndarray, size: SizeField) -> Qu
     all_points, all_quads = np.concatenate(points), np.concatenate(quads)
     used, inverse = np.unique(all_quads, return_inverse=True)  # corners that no patch uses are dropped
     mesh = QuadMesh(all_points[used], np.ascontiguousarray(inverse.reshape(all_quads.shape)))
-    check_mesh(mesh)
+    mesh = sound(mesh)
     return mesh
 
 

@@ -66,30 +66,3 @@ class QuadMesh:
         near = distance_to_segment(self.points, start, end) <= tolerance * self.diameter()
         nodes = np.flatnonzero(near)
         return nodes[np.argsort((self.points[nodes] - start) @ along, kind="stable")]
-
-
-def check_mesh(mesh: QuadMesh) -> None:
-    """Raise ValueError, naming the first offender, when an element is not a convex counter-clockwise quad."""
-    quality = mesh.corner_quality()
-    bad = np.flatnonzero(quality <= 1e-3)
-    if len(bad):
-        where = mesh.points[mesh.quads[bad[0]]].mean(axis=0)
-        raise Refused(
-            f"{len(bad)} of {len(quality)} elements are not convex (first: element {bad[0]} near "
-            f"({where[0]:.4g}, {where[1]:.4g}) m, smallest corner sine {quality[bad[0]]:.2g})"
-        )
-    unused = np.setdiff1d(np.arange(len(mesh.points)), mesh.quads)
-    if len(unused):
-        raise Refused(f"{len(unused)} nodes belong to no element (first: node {unused[0]})")
-
-
-def orient(points: np.ndarray, quads: np.ndarray) -> QuadMesh:
-    """Mesh from file data: clockwise elements are turned, nodes that no element uses are dropped."""
-    points = np.ascontiguousarray(points[:, :2], dtype=np.float64)
-    quads = np.ascontiguousarray(quads, dtype=np.int64)
-    areas = QuadMesh(points, quads).areas()
-    quads = np.where((areas < 0)[:, None], quads[:, ::-1], quads)
-    used, inverse = np.unique(quads, return_inverse=True)
-    mesh = QuadMesh(points[used], np.ascontiguousarray(inverse.reshape(quads.shape)))
-    check_mesh(mesh)
-    return mesh

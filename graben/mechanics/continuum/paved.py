@@ -12,7 +12,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from graben.errors import Refused
-from graben.mechanics.continuum.mesh2d import QuadMesh, check_mesh
+from graben.mechanics.continuum.mesh2d import QuadMesh
+from graben.mechanics.continuum.one_body import sound
 from graben.mechanics.continuum.sizing import SizeField, distance_to_segment
 
 _RELAXATIONS = 40
@@ -48,7 +49,7 @@ def paved_mesh(outline: np.ndarray, size: SizeField) -> QuadMesh:
     triangles = _triangles(points, outline)
     _check_border(triangles, len(border))
     mesh = _three_quads_each(points, triangles)
-    check_mesh(mesh)
+    mesh = sound(mesh)
     if abs(mesh.areas().sum() - area) > 1e-9 * area:
         raise Refused("the mesh does not fill the outline; try a smaller size near its narrow parts")
     return mesh

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from graben.mechanics.continuum.mapped import mapped_mesh
-from graben.mechanics.continuum.mesh2d import QuadMesh, orient
+from graben.mechanics.continuum.mesh2d import QuadMesh
 from graben.mechanics.continuum.paved import paved_mesh
 from graben.mechanics.continuum.sizing import SizeField
 from graben.mechanics.continuum.surface import free_surface
@@ -90,13 +90,6 @@ def test_bad_domains_are_named():
         SizeField(-1.0)
     with pytest.raises(ValueError, match="name node 9 of 4"):
         QuadMesh(np.zeros((4, 2)), np.array([[0, 1, 2, 9]]))
-
-
-def test_clockwise_elements_of_a_file_are_turned_and_unused_nodes_dropped():
-    points = np.array([(9, 9), (0, 0), (1, 0), (1, 1), (0, 1)], float)
-    mesh = orient(points, np.array([[4, 3, 2, 1]]))
-    assert len(mesh.points) == 4
-    np.testing.assert_allclose(mesh.areas(), 1.0)
 
 
 def test_the_free_surface_runs_along_the_top_from_left_to_right():
