@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,10 +20,10 @@ _KINDS = {
     **dict.fromkeys(("CPE3", "CPE3H", "CPS3", "S3", "S3R", "S3RS", "STRI3"), "triangle"),
     **dict.fromkeys(("CPE6", "CPE6H", "CPE6M", "CPE6MH", "CPS6", "CPS6M", "STRI65"), "triangle6"),
     **dict.fromkeys(("CPE8", "CPE8R", "CPE8H", "CPE8RH", "CPS8", "CPS8R", "S8", "S8R", "S8R5"), "quad8"),
-    **dict.fromkeys(("T2D2", "T3D2", "B21", "B31"), "line"),
-    **dict.fromkeys(("T2D3", "T3D3", "B22", "B32"), "line3"),
 }
-_NODES = {"quad": 4, "triangle": 3, "triangle6": 6, "quad8": 8, "line": 2, "line3": 3}
+_NODES = {"quad": 4, "triangle": 3, "triangle6": 6, "quad8": 8}
+_LINE = re.compile(r"(T[23]D[23]|B[23][123])[A-Z]*")  # trusses and beams; Gmsh and meshio name outlines so
+_QUADS_OF_MESHIO = "CAX4P"  # meshio writes this name for every quad
 # Keywords that make or move nodes and elements by rule.
 _BY_RULE = {"NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "SUBMODEL"}
 
@@ -73,7 +74,9 @@ def read_deck(path: Path) -> tuple[np.ndarray, list[Block], list[str]]:
                     raise BadInput(Fault(str(path), f"element {label}", f"node {node}", "nodes that *Node defines"))
         same = min(len(nodes) for _, nodes in chosen)  # all, where the name is known
         corners = np.array([[row[n] for n in nodes[:same]] for _, nodes in chosen], dtype=np.int64)
-        kind = _KINDS.get(element_type, element_type)
+        kind = "line" if _LINE.fullmatch(element_type) else _KINDS.get(element_type, element_type)
+        if element_type == _QUADS_OF_MESHIO and reader.by_meshio:
+            kind = "quad"
         blocks.append(Block(kind, element_type, corners, np.array([label for label, _ in chosen])))
         if element_type in _OTHER_PLANES:
             notes.append(
@@ -89,6 +92,7 @@ class _Reader:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self.by_meshio = False
         self.scopes: dict[str, _Scope] = {}
         self.instances: list[tuple[str, str, list[list[float]]]] = []  # name, part, rows of the placing
         self._scope = ""
@@ -98,6 +102,7 @@ class _Reader:
         if depth > 10:
             raise BadInput(Fault(str(self.path), "*Include", str(path), "files that do not include each other"))
         text = _text(path)
+        self.by_meshio = self.by_meshio or "written by meshio" in text[:500]
         for keyword, options, rows, where in _sections(text):
             try:
                 self._take(keyword, options, rows, path, depth)

@@ -91,9 +91,12 @@ def read_by_meshio(path: Path) -> Any:
     except BadInput:
         raise
     except (SystemExit, Exception) as error:  # meshio raises many kinds, and prints before it exits
-        reason = str(error) if not isinstance(error, SystemExit) else ""
-        text = " ".join(f"{said.getvalue()} {reason}".split()) or type(error).__name__
-        raise BadInput(Fault(str(path), "", "", f"a mesh file that can be read ({text})")) from None
+        told = [line for line in said.getvalue().splitlines() if line.strip() and not line.startswith("Error:")]
+        told += [] if isinstance(error, SystemExit) else [str(error)]
+        reason = (
+            " ".join(" ".join(told).split()) or f"its content is not that of a {path.suffix} file, or it is damaged"
+        )
+        raise BadInput(Fault(str(path), "", "", f"a mesh file that meshio reads ({reason})")) from None
 
 
 def _by_meshio(path: Path) -> tuple[np.ndarray, list[Block], list[str]]:
@@ -131,7 +134,7 @@ def _other_kind(path: Path, points: np.ndarray, block: Block) -> Fault:
     )
     first = np.asarray(block.corners[0], dtype=np.int64)
     where = ""
-    if len(first) and 0 <= first.min() and first.max() < len(points):
+    if len(first) and first.min() >= 0 and first.max() < len(points):
         x, y, _ = points[first].mean(axis=0)
         where = f" near ({x:.6g}, {y:.6g})"
     found = f"{len(block.corners)} of kind {block.name}, the first number {block.numbers[0]}{where}"

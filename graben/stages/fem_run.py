@@ -192,7 +192,8 @@ def _problem(scene: FemScene, mesh: QuadMesh, law: Material) -> Problem:
 
 def _sizes(scene: FemScene, mesh: QuadMesh) -> str:
     """A hint for a mesh file whose size is far from that of the scene's segments: units slip."""
-    ends = np.array([p for part in (*scene.supports, *scene.loads) for p in (part.start, part.end)], dtype=float)
+    segments = [(s.start, s.end) for s in scene.supports] + [(load.start, load.end) for load in scene.loads]
+    ends = np.array(segments, dtype=float).reshape(-1, 2)
     spans = np.ptp(mesh.points, axis=0), np.ptp(ends, axis=0)
     ratio = spans[0].max() / spans[1].max() if spans[1].max() > 0 else 1.0
     if scene.mesh.method != "file" or 0.1 < ratio < 10.0:

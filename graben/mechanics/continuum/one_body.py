@@ -199,13 +199,14 @@ def _overlaps(corner: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if shapely.coverage_is_valid(shapes):
         return np.zeros(0, dtype=np.int64), np.zeros((0, 2))
     suspects = np.flatnonzero(~shapely.is_empty(shapely.coverage_invalid_edges(shapes)))
-    tree = shapely.STRtree(shapes[suspects])
-    one, two = tree.query(shapes[suspects], predicate="intersects")
-    one, two = suspects[one[one != two]], suspects[two[one != two]]
+    one, two = shapely.STRtree(shapes).query(shapes[suspects], predicate="intersects")
+    one = suspects[one]
+    one, two = one[one != two], two[one != two]
     shared = shapely.intersection(shapes[one], shapes[two])
     real = shapely.area(shared) > SAME_PLACE * np.minimum(shapely.area(shapes[one]), shapely.area(shapes[two]))
-    over, first = np.unique(one[real], return_index=True)
-    return over, shapely.get_coordinates(shapely.centroid(shared[real][first]))
+    over, first = np.unique(np.concatenate([one[real], two[real]]), return_index=True)
+    centre = shapely.get_coordinates(shapely.centroid(shared[real]))
+    return over, np.concatenate([centre, centre])[first]
 
 
 def _loose_parts(mesh: QuadMesh, edge_of: np.ndarray, numbers: np.ndarray) -> list[MeshFault]:
