@@ -56,6 +56,11 @@ def tell_apart(columns: Columns, complete: np.ndarray, file: str, alone: str) ->
 def _by_name(columns: Columns, complete: np.ndarray, file: str) -> tuple[list[Rows], list[Fault]]:
     names, strain = np.array(columns.names), columns.values["strain_yy"]
     title = columns.titles["name"]
+    count = len(set(columns.names or []))
+    if count > max(1, len(names) // 2):
+        found = f"{count} names in {len(names)} rows"
+        expected = "one name for all rows of a test; a counter needs another title, such as number"
+        return [], [Fault(file, title, found, expected)]
     found, faults = [], []
     for name in dict.fromkeys(columns.names or []):
         index = np.flatnonzero(names == name)
@@ -92,7 +97,7 @@ def _blocks(columns: Columns, rows: np.ndarray, file: str) -> tuple[list[tuple[n
         mean = total / n
         other = abs(level[i] - mean) > max(_WITHIN * mean, floor)
         nominal = n > 1 and level[i] != level[last] == level[begin] == level[rows[(first + k) // 2]]
-        anew = time is not None and time[i] <= time[begin] and (n > 1 or level[i] != mean)
+        anew = time is not None and time[i] <= time[begin] and (n > 1 or other)
         fallen = _falls(strain[begin], strain[last], strain[i], reach)
         if anew or (fallen and (other or nominal)):
             parts.append((rows[first:k], told))

@@ -110,6 +110,11 @@ def test_names_win_over_everything_measured(tmp_path):
     assert "a time that increases" in refused(tmp_path, again, names=names)
 
 
+def test_a_counter_is_no_name(tmp_path):
+    message = refused(tmp_path, block(5.0), names=[str(i) for i in range(STEPS)])
+    assert "name = 40 names in 40 rows" in message and message.count("\n") == 0
+
+
 def test_stages_of_one_specimen_and_a_cell_that_fills_are_refused(tmp_path):
     stages = block(5.0)
     stages[20:, 0] = 10.0
