@@ -58,9 +58,9 @@ def _by_name(columns: Columns, complete: np.ndarray, file: str) -> tuple[list[Ro
     title = columns.titles["name"]
     count = len(set(columns.names or []))
     if count > max(1, len(names) // 2):
-        found = f"{count} names in {len(names)} rows"
+        shown = f"{count} names in {len(names)} rows"
         expected = "one name for all rows of a test; a counter needs another title, such as number"
-        return [], [Fault(file, title, found, expected)]
+        return [], [Fault(file, title, shown, expected)]
     found, faults = [], []
     for name in dict.fromkeys(columns.names or []):
         index = np.flatnonzero(names == name)
