@@ -158,16 +158,6 @@ def test_seeds_are_what_generators_take(seed):
     assert not refused("wear", {**tables, "seed": 2**32 - 1})
 
 
-@pytest.mark.parametrize("search", ["cma-es", "differential-evolution"])
-def test_a_population_too_small_for_its_search(search):
-    tables = tomllib.loads(template("calibrate"))
-    tables["search"] = search
-    tables.setdefault("swarm", {})["particles"] = 4
-    assert refused("calibrate", tables)
-    tables["swarm"]["particles"] = 5
-    assert not refused("calibrate", tables)
-
-
 @pytest.mark.parametrize("scale", [1e-6, 1e3])
 def test_small_and_large_models_are_within_the_bounds(scale):
     tables = tomllib.loads(template("blocks"))

@@ -85,10 +85,6 @@ class RefineTable(Model):
     iterations: Integer = key(40, "at most this many iterations (Y: 20)", ge=0, le=100_000)
 
 
-_POPULATIONS = ("differential-evolution", "cma-es")
-_SMALLEST = 5
-"""Smallest population of these searches."""
-
 _FREE: Any = {
     "young_modulus": {"lower": "0.5 GPa", "upper": "25 GPa", "scale": "log"},
     "poisson_ratio": {"lower": 0.05, "upper": 0.45},
@@ -160,11 +156,6 @@ class CalibrateScene(Scene):
             faults += self._free_faults(name, free)
             if name in self.fixed:
                 faults.append(f"free.{name}: expected either free or fixed, not both")
-        if self.search in _POPULATIONS and (self.swarm.particles or _SMALLEST) < _SMALLEST:
-            faults.append(
-                f"swarm.particles = {self.swarm.particles}: expected at least {_SMALLEST}, "
-                f'because search = "{self.search}"'
-            )
         if not self.free:
             faults.append("free: expected at least one parameter")
         if faults:
