@@ -50,6 +50,17 @@ class Source:
         return hashlib.sha256(self.effective_text.encode()).hexdigest()
 
 
+def _name(text: str) -> str:
+    if len(text) > 200 or _CONTROL.search(text):
+        raise Refused("a name of at most 200 characters, in one line")
+    return text
+
+
+_CONTROL = re.compile("[\\x00-\\x1f\\x7f]")
+Name = Annotated[str, AfterValidator(_name)]
+"""A word or a few that tables, files and messages repeat."""
+
+
 class Scene(Model):
     """The keys that every scene has. Each kind derives from this and declares ``kind: Literal["..."]``."""
 

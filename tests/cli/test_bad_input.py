@@ -163,6 +163,25 @@ def test_radii_need_units(small_blocks, tmp_path):
     assert "--radius" in said
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ("homogenize", "--radius", "1,0 m"),
+        ("homogenize", "--radius", "1 000 mm"),
+        ("homogenize", "--radius", "9**9**9 m"),
+        ("homogenize", "--radius", "1e-300 m"),
+        ("homogenize", "--radius", "1 m", "--centre", "1,5 m,1,5 m"),
+        ("homogenize", "--polygon", "0.5 m,0.5 m; 2,5 m,0.5 m; 1 m,2 m"),
+        ("rev-study", "--radius", "0,5 m", "--radius", "1 m"),
+        ("rev-study", "--radius", '0.5 m", "0.6 m', "--radius", "1 m"),
+    ],
+)
+def test_lengths_of_options_are_one_number_and_one_unit(wrong, small_blocks, tmp_path):
+    tool, *options = wrong
+    said = refuse(tmp_path, tool, small_blocks, *options, "-o", tmp_path / "out.nc")
+    assert "quantity in m" in said or "two lengths" in said
+
+
 def test_pictures_of_unknown_format(small_blocks, tmp_path):
     assert ".png" in refuse(tmp_path, "show", small_blocks, "-o", tmp_path / "a.bmp")
 

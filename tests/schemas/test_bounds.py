@@ -167,3 +167,10 @@ def test_small_and_large_models_are_within_the_bounds(scale):
     tables["loading"]["speed"] = f"{5e-3 * scale!r} m/s"
     tables.pop("programme", None)
     scene_model("blocks").model_validate(tables)
+
+
+@pytest.mark.parametrize("name", ["a\0b", "two\nlines", "x" * 10_000, ""])
+def test_names_are_short_and_in_one_line(name):
+    tables = tomllib.loads(template("wear"))
+    tables["mixtures"][0]["name"] = name
+    assert refused("wear", tables)

@@ -21,7 +21,7 @@ from graben.schemas.quantities import (
     Time,
     key,
 )
-from graben.schemas.scene import Model
+from graben.schemas.scene import Model, Name
 
 Point = tuple[Length, Length]
 SpeedCourse = list[tuple[Time, Speed]]
@@ -100,7 +100,7 @@ class Loading(Model):
 class Support(Model):
     """No displacement along a segment of the outline."""
 
-    name: str = key("support", "name, for messages")
+    name: Name = key("support", "name, for messages")
     start: Point = key(..., "one end of the segment")
     end: Point = key(..., "the other end")
     fix: Literal["x", "y", "both"] = key("both", "displacement held at zero: x or y (a roller), or both")
@@ -109,7 +109,7 @@ class Support(Model):
 class Load(Model):
     """Pressure on a part of the outline, dead: it keeps the direction and length of the undeformed outline."""
 
-    name: str = key("load", "name, for messages")
+    name: Name = key("load", "name, for messages")
     start: Point = key(..., "one end of the loaded segment")
     end: Point = key(..., "the other end")
     pressure: Pressure = key("0 Pa", "pressure from the start, applied with gravity; pushes into the body")
@@ -137,7 +137,7 @@ class Load(Model):
 class Excavation(Model):
     """Blocks taken out of the body while it is loaded."""
 
-    name: str = key("excavation", "name, for messages")
+    name: Name = key("excavation", "name, for messages")
     polygon: list[Point] = key(
         ..., "corner points: blocks whose middle lies in it then go", min_length=3, max_length=100_000
     )

@@ -18,7 +18,7 @@ from graben.schemas.quantities import (
     Time,
     key,
 )
-from graben.schemas.scene import InputFile, Model, Scene
+from graben.schemas.scene import InputFile, Model, Name, Scene
 from graben.schemas.scenes.material import MaterialTable
 
 Point = tuple[Length, Length]
@@ -127,7 +127,7 @@ class Mesh(Model):
 class Support(Model):
     """Prescribed zero displacement along a segment of the outline."""
 
-    name: str = key("support", "name, for messages")
+    name: Name = key("support", "name, for messages")
     start: Point = key(..., "one end of the segment")
     end: Point = key(..., "the other end")
     fix: Literal["x", "y", "both"] = key("both", "displacement held at zero: x or y (a roller), or both")
@@ -136,7 +136,7 @@ class Support(Model):
 class Load(Model):
     """Pressure on a part of the outline: a steady part, and one that rises after gravity."""
 
-    name: str = key("load", "name, for messages")
+    name: Name = key("load", "name, for messages")
     start: Point = key(..., "one end of the loaded segment")
     end: Point = key(..., "the other end")
     pressure: Pressure = key("0 Pa", "pressure from the start, applied with gravity; pushes into the body")

@@ -17,13 +17,13 @@ from graben.schemas.quantities import (
     Switch,
     key,
 )
-from graben.schemas.scene import Model, Scene
+from graben.schemas.scene import Model, Name, Scene
 
 
 class GrainSize(Model):
     """Equal grains."""
 
-    name: str = key(..., "name of the class", min_length=1, examples=["grains"])
+    name: Name = key(..., "name of the class", min_length=1, examples=["grains"])
     diameter: Length = key(..., "diameter", gt=0, examples=["100 um"])
     share: Number = key(1.0, "volume share of the class; the shares sum to 1", ge=0, le=1)
     density: Density = key("2200 kg/m^3", "density (default: quartz sand, H table 8.3)", gt=0)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from graben.schemas.quantities import AngularSpeed, Area, Force, Length, Number, key
-from graben.schemas.scene import InputFile, Model, Scene
+from graben.schemas.scene import InputFile, Model, Name, Scene
 
 Share = Annotated[Number, Field(ge=0, le=1)]
 
@@ -25,7 +25,7 @@ class Groove(Model):
 class GrainClass(Model):
     """A size of grain."""
 
-    name: str = key(..., "name of the class; mixtures and --scratch refer to it", min_length=1, examples=["fine"])
+    name: Name = key(..., "name of the class; mixtures and --scratch refer to it", min_length=1, examples=["fine"])
     diameter: Length = key(..., "diameter", gt=0, examples=["100 um"])
     grooves: tuple[Groove, ...] = key(
         (), "grooves by a grain of this size at one force or more; or give --scratch NAME=FILE"
@@ -36,7 +36,7 @@ class GrainClass(Model):
 class Mixture(Model):
     """Grains in shares of volume."""
 
-    name: str = key(..., "name of the mixture", min_length=1, examples=["homogeneous"])
+    name: Name = key(..., "name of the mixture", min_length=1, examples=["homogeneous"])
     shares: dict[str, Share] = key(..., "class name -> volume share; sums to 1", examples=[{"fine": 1.0}])
 
     @model_validator(mode="after")
