@@ -29,6 +29,7 @@ from graben.stages.blocks_output import write_vtk
 from graben.stages.blocks_programme import Rising
 from graben.stages.blocks_sizes import sizes_of
 from graben.stages.estimate import Estimate, refuse_too_large
+from graben.stages.measures import warnings_of
 from graben.stages.record import Progress, Record, silent
 
 # Steps of loading for each fidelity; their measured trade is in docs/dem-run-blocks.md
@@ -85,6 +86,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         raise
     arrays = _arrays(model, history, test)
     headline = test.headline(arrays) | ground.mended
+    headline["warnings"] = record.warnings = warnings_of(test.measures(headline))
     arrays = ground.placed(arrays)
     record.cost |= {
         "steps": model.steps_done,

@@ -16,6 +16,7 @@ from graben.mechanics.blocks.pace import ForceCheck, Pace
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.schemas.scenes.blocks_loading import Loading
 from graben.stages.blocks_checkpoint import refuse_unlike
+from graben.stages.measures import Measure, number
 from graben.stages.record import Progress
 
 
@@ -111,7 +112,8 @@ class Biaxial:
         sides = rectangle_sides(self.model.bodies.outline)
         push = arrays["wall_reaction"]
         low, size = self.model.bodies.outline.min(axis=0), np.ptp(self.model.bodies.outline, axis=0)
-        vertical = push[:, sides.top, 1] / size[0]
+        bottom, top = push[:, sides.bottom, 1], -push[:, sides.top, 1]
+        vertical = -top / size[0]
         peak = int(np.argmin(vertical))
         bodies, area, stress = self.model.bodies, self.model.zone_area, arrays["zone_stress"]
         middle = arrays["vertex_position"][bodies.zone_vertex].mean(axis=1)
@@ -124,16 +126,35 @@ class Biaxial:
         return {
             "blocks": len(arrays["block_area"]),
             "confining_stress_pa": float(arrays["confining_stress"]),
-            "peak_wall_stress_pa": float(vertical[peak]),
-            "strain_at_peak": self._strain(float(arrays["time"][peak]), size[1]),
+            "peak_wall_stress_pa": number(vertical[peak]),
+            "strain_at_peak": number(self._strain(float(arrays["time"][peak]), size[1])),
             "steps": self.model.steps_done,
             "loose_blocks": int(arrays["loose_blocks"].max()),
             "energy_error": energy_error(arrays),
-            "kinetic_over_stored_energy": float(kinetic_share(arrays)[after].mean()),
-            "lateral_over_applied_stress": float((lateral / applied)[after].mean()),
+            "kinetic_over_stored_energy": number(kinetic_share(arrays)[after].mean()),
+            "lateral_over_applied_stress": number((lateral / applied)[after].mean()),
             **self._paced(),
-            "bottom_over_top_reaction": float((push[after, sides.bottom, 1] / -push[after, sides.top, 1]).mean()),
+            "bottom_over_top_reaction": number(ratio(bottom, top)[after].mean()),
         }
+
+    def measures(self, headline: dict[str, Any]) -> list[Measure]:
+        """Error measures with their thresholds; lateral stress within a third of the applied goes with peaks that
+        are a tenth too high at most."""
+        return [
+            energy_measure(headline),
+            kinetic_measure(headline),
+            Measure(
+                "lateral_over_applied_stress", headline["lateral_over_applied_stress"], 1.3,
+                "the lateral stress inside is {value} times the applied one: inertia confines the blocks and "
+                "the peak is too high; take more steps (numerics.steps), a finer fidelity, or numerics.force_check",
+            ),
+            Measure(
+                "bottom_over_top_reaction", headline["bottom_over_top_reaction"], 1.1,
+                "the bottom bears {value} of what the top does: the test is too fast for its steps; take more of "
+                "them (numerics.steps) or a finer fidelity",
+                least=0.9,
+            ),
+        ]  # fmt: skip
 
 
 def _force_check(scene: BlocksScene, steps: int) -> ForceCheck | None:
@@ -155,14 +176,36 @@ def _courses(loading: Loading, dt: float, always: bool) -> Courses | None:
     )
 
 
+def energy_measure(headline: dict[str, Any]) -> Measure:
+    """The run stops at numerics.energy_limit; half of its default is told."""
+    return Measure(
+        "energy_error", headline["energy_error"], 0.025,
+        "the energy ledger is off by {percent} of the work done; take more steps (numerics.steps)",
+    )  # fmt: skip
+
+
+def kinetic_measure(headline: dict[str, Any]) -> Measure:
+    """Quasi-static tests keep a few percent of the energy in motion."""
+    return Measure(
+        "kinetic_over_stored_energy", headline["kinetic_over_stored_energy"], 0.05,
+        "kinetic energy is {percent} of the stored one (5 % is the most of a quasi-static test): the load comes too "
+        "fast; take more steps (numerics.steps) or a finer fidelity",
+    )  # fmt: skip
+
+
+def ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    """part / whole, 0 where both are."""
+    return np.divide(part, np.where((part == 0.0) & (whole == 0.0), 1.0, whole))
+
+
 def energy_error(arrays: dict[str, np.ndarray]) -> float:
     """Largest error of the ledger over the work done and the energy stored."""
     stored = arrays["energy_strain"] + arrays["energy_joint"]
     work = abs(arrays["energy_boundary"]) + abs(arrays["energy_external"]) + stored
-    return float((np.abs(arrays["energy_error"]) / work).max())
+    return float(ratio(np.abs(arrays["energy_error"]), work).max())
 
 
 def kinetic_share(arrays: dict[str, np.ndarray]) -> np.ndarray:
     """Kinetic over stored energy per state; what flies loose counts in neither."""
     moving = arrays["energy_kinetic"] - arrays["energy_kinetic_loose"]
-    return moving / (arrays["energy_strain"] + arrays["energy_joint"])
+    return ratio(moving, arrays["energy_strain"] + arrays["energy_joint"])

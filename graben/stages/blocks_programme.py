@@ -18,8 +18,9 @@ from graben.mechanics.blocks.loads import Loads
 from graben.mechanics.blocks.model import BlockModel
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.schemas.scenes.blocks_loading import Load, Programme
-from graben.stages.blocks_biaxial import energy_error, kinetic_share
+from graben.stages.blocks_biaxial import energy_error, energy_measure, kinetic_measure, kinetic_share
 from graben.stages.blocks_checkpoint import refuse_unlike
+from graben.stages.measures import Measure
 from graben.stages.record import Progress
 
 
@@ -239,6 +240,19 @@ class Rising:
             "energy_error": energy_error(arrays),
             "kinetic_over_stored_energy": _mean(kinetic_share(arrays)[1:-1]),
         }
+
+    def measures(self, headline: dict[str, Any]) -> list[Measure]:
+        """Error measures with their thresholds. A stack that topples 19 % too late has an inertia of 3 % of its load,
+        so that one says no more than that a load is surely too high."""
+        return [
+            energy_measure(headline),
+            kinetic_measure(headline),
+            Measure(
+                "inertia_over_load", headline["inertia_over_load"], 0.02,
+                "inertia bears {percent} of the load: a failure load may be far too high; lower programme.calm, or "
+                "take more steps (numerics.steps)",
+            ),
+        ]  # fmt: skip
 
 
 def _mean(values: np.ndarray) -> float:

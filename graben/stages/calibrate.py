@@ -22,12 +22,13 @@ from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.material import material_text, write_material
 from graben.stages.calibrate_compare import Candidate, cross_validate, label, rivals
 from graben.stages.calibrate_compare import compare as compared
-from graben.stages.calibrate_output import arrays_of, distinct, headline_of, note_of
+from graben.stages.calibrate_output import arrays_of, distinct, headline_of, measures_of, note_of
 from graben.stages.calibrate_problem import Problem, problem_of, sizes_of
 from graben.stages.calibrate_state import State, digest_of
 from graben.stages.calibrate_workers import workers_of
 from graben.stages.estimate import Estimate, refuse_too_large
 from graben.stages.measured import Reading, read_files
+from graben.stages.measures import warnings_of
 from graben.stages.record import Progress, Record, silent
 
 _NEAR = 1.1  # members of the ensemble: objective up to this multiple of the best
@@ -173,6 +174,7 @@ def run(
         "read": json.dumps(prepared.read),
     }
     headline = headline_of(scene, problem, measured, unseen, values, known, errors, holdout, arrays, candidates)
+    headline["warnings"] = record.warnings = warnings_of(measures_of(headline))
     with together():
         write_material(material_path, scene.law, ordered, note)
         write_artifact(output, LAYOUT, arrays, record, attributes)

@@ -16,6 +16,7 @@ from graben.mechanics.search.space import Box
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.stages.calibrate_compare import Candidate
 from graben.stages.calibrate_problem import Problem
+from graben.stages.measures import Measure
 
 
 def distinct(members: np.ndarray, gap: float = 1e-3) -> np.ndarray:
@@ -163,6 +164,19 @@ def headline_of(
         out["validation_inside_95_band"] = float(inside[np.isfinite(gap)].mean())
         out["validation_curve_rmse_pa"] = {c.name: float(e) for c, e in zip(unseen, each)}
     return out
+
+
+def measures_of(headline: dict[str, Any]) -> list[Measure]:
+    """What a user should know before the parameters go on to the next stage."""
+
+    def some(name: str, sentence: str) -> Measure:
+        return Measure(name, float(len(headline[name])), 0.0, f"{', '.join(headline[name])}: {sentence}")
+
+    return [
+        some("incomplete", "the law cannot follow these curves to their ends"),
+        some("at_bounds", "the bound chose the value, not the curves: widen it in [free], or fix the parameter"),
+        some("not_identifiable", "the curves do not tell these parameters apart: fix some, or add curves"),
+    ]
 
 
 def _finite(value: float) -> float | None:

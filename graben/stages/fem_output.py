@@ -41,19 +41,22 @@ class History:
         self.time, self.pressure, self.settlement, self.iterations = [0.0], [pressure], [0.0], [0]
         self.carried = [pressure]
 
+    def viscous(self, step: Step) -> float:
+        """Pressure that viscous forces carry in a step from the latest state, Pa."""
+        if step.drag is None:
+            return 0.0
+        increment = step.state.displacement - self._latest[1].displacement
+        moved = float(self._settling @ increment)
+        return float(step.drag @ increment) / (self._length * moved) if moved > 0 else 0.0
+
     def add(self, time: float, state: State, force: np.ndarray, step: Step, pressure: float) -> None:
         """Take in an accepted step; keep its state if it falls on a time to save.
 
         The pressure that the law carries is what remains of the applied one when the power of the viscous forces is
         taken off that of the pressure.
         """
+        self.carried.append(pressure - self.viscous(step))
         self.previous = self._latest[1]
-        overload = 0.0
-        if step.drag is not None:
-            increment = state.displacement - self.previous.displacement
-            moved = float(self._settling @ increment)
-            overload = float(step.drag @ increment) / (self._length * moved) if moved > 0 else 0.0
-        self.carried.append(pressure - overload)
         self._latest = (time, state, force)
         self.time.append(time)
         self.pressure.append(pressure)

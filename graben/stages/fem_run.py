@@ -24,10 +24,13 @@ from graben.stages.fem_mesh import mesh_of
 from graben.stages.fem_output import History, write_run
 from graben.stages.fem_sizes import sizes_of
 from graben.stages.material import pack_material
+from graben.stages.measures import Measure, warnings_of
 from graben.stages.record import Progress, Record, silent
 
 # Gravity is a load history of its own, of unit length, in steps that are halved as the pressures' are.
 _GRAVITY_STEPS = StepOptions(first=0.1, largest=0.5, smallest=1e-3)
+# Viscous stress below this multiple of the rise of the pressure in the relaxation time is that of elastic strain.
+_VISCOUS = 5.0
 
 
 @dataclass(frozen=True)
@@ -99,7 +102,12 @@ def run(
     settling = problem.unit_pressure / problem.loaded_length
     history = History(scene, settled, settling, problem.loaded_length, problem.offset)
     if not settled.complete:
-        headline = {"failed": True, "failure_load_pa": None, "compliance_ratio": 1.0, "stiffness_ratio": 1.0}
+        headline: dict[str, Any] = {
+            "failed": True,
+            "failure_load_pa": None,
+            "compliance_ratio": 1.0,
+            "stiffness_ratio": 1.0,
+        }
         partial = replace(problem, steady=settled.time * problem.steady)
         write_run(last_good, record, scene, body, settled, history, problem.support_nodes, partial.external, headline)
         raise NumericsFailed(
@@ -111,6 +119,7 @@ def run(
     failed = not loaded.complete
     headline = _headline(scene, problem, settled, loaded, history) | notes
     record.cost.update(_cost(body, settled, loaded, headline))
+    headline["warnings"] = record.warnings = warnings_of(_measures(headline))
     target = last_good if failed and scene.stepping.goal == "end" else output
     progress(0.98, "writing")
     write_run(target, record, scene, body, settled, history, problem.support_nodes, problem.external, headline)
@@ -221,18 +230,21 @@ def _load_up(
 ) -> March:
     options = scene.stepping
 
-    def accepted(time: float, state: State, force: np.ndarray, step: Step) -> str | None:
+    def overloaded(time: float, step: Step) -> str | None:
+        pressure = problem.offset + problem.rate * time
+        viscous = history.viscous(step)
+        # The elastic response to a rising pressure has a viscous part of its own, which is no overload.
+        if viscous > options.overload * pressure and viscous > _VISCOUS * problem.rate * options.relaxation:
+            return f"viscous stress carries {viscous / 1e6:.3g} MPa of the pressure"
+        return None
+
+    def accepted(time: float, state: State, force: np.ndarray, step: Step) -> None:
         pressure = problem.offset + problem.rate * time
         history.add(time, state, force, step, pressure)
         progress(
             0.02 + 0.95 * time / options.end,
             f"{time:.4g} s, {pressure / 1e6:.4g} MPa, {step.iterations} iterations",
         )
-        viscous = pressure - history.carried[-1]
-        # The elastic response to a rising pressure has a viscous part of its own, which is no overload.
-        if viscous > options.overload * pressure and viscous > 5.0 * problem.rate * options.relaxation:
-            return f"viscous stress carries {viscous / 1e6:.3g} MPa of the pressure"
-        return None
 
     return march(
         problem.body,
@@ -240,11 +252,12 @@ def _load_up(
         problem.external,
         0.0,
         options.end,
-        StepOptions(options.first, options.largest, options.smallest, extrapolate=options.extrapolate),
+        StepOptions(options.first, options.largest, options.smallest, extrapolate=options.extrapolate, resolve=True),
         newton,
         save_times=np.arange(options.save_every, options.end, options.save_every),
         relaxation=options.relaxation,
         accepted=accepted,
+        overloaded=overloaded,
     )
 
 
@@ -258,19 +271,46 @@ def _headline(scene: FemScene, problem: Problem, settled: March, loaded: March, 
         increment = last.displacement - history.previous.displacement
         stiffness = softest_stiffness(problem.body, last, increment, history.previous)
     carried = max(history.carried)
+    reason = loaded.reason
+    hidden = _VISCOUS * problem.rate * scene.stepping.relaxation
+    known = loaded.time > 0.0 and carried > hidden
+    if failed and loaded.time == 0.0:
+        reason = f"no equilibrium at the smallest rise of the load that was tried; {reason}"
+    elif failed and not known:
+        hides = f"stabilisation hides failures below {hidden / 1e6:.3g} MPa"
+        reason = f"{hides}; lower the rate or stepping.relaxation; {reason}"
     return {
-        "failure_load_pa": carried if failed else None,
+        "failure_load_pa": carried if failed and known else None,
         "failed": failed,
         "largest_load_pa": pressure,
         "settlement_m": history.settlement[-1],
         "compliance_ratio": history.compliance_ratio(),
         "stiffness_ratio": stiffness / elastic if elastic > 0 else 0.0,
         "stabilisation_share": loaded.drag_work / loaded.external_work if loaded.external_work > 0 else 0.0,
-        "reason": loaded.reason,
+        "reason": reason,
         "elements": len(problem.body.mesh.quads),
         "steps": len(loaded.iterations),
         "energy_error": max(settled.energy_error(), loaded.energy_error()),
     }
+
+
+def _measures(headline: dict[str, Any]) -> list[Measure]:
+    """Error measures with their thresholds; a load march that is followed closes its work to a thousandth."""
+    unknown = headline["failed"] and headline["failure_load_pa"] is None
+    return [
+        Measure(
+            "failure_load_pa", 1.0 if unknown else None, 0.0,
+            f"the failure load is not known: {headline['reason']}",
+        ),
+        Measure(
+            "energy_error", headline["energy_error"], 0.02,
+            "work of loads and of stresses differ by {percent}: take smaller steps (stepping.largest)",
+        ),
+        Measure(
+            "stabilisation_share", headline["stabilisation_share"], 0.05,
+            "viscous stabilisation took {percent} of the work of the loads: lower stepping.relaxation",
+        ),
+    ]  # fmt: skip
 
 
 def _cost(body: Body, settled: March, loaded: March, headline: dict[str, Any]) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from graben.schemas.layouts.curves import LAYOUT
 from graben.schemas.outputs import SERIES, Outputs
 from graben.schemas.vtk import vtu_series
 from graben.stages.block_history import Run, read_run
+from graben.stages.measures import Measure, warnings_of
 from graben.stages.record import Progress, Record, silent
 
 Point = tuple[float, float]
@@ -106,6 +107,7 @@ def run(
         "outline_chosen_at": chosen_at,
         "stress_from": "zones, and the forces on blocks without zones" if rigid else "zones",
     }
+    record.warnings = warnings_of(_measures(record.cost))
     with together():
         if steps_picture is not None:
             from graben.stages.show.outline_steps import save_steps
@@ -114,7 +116,20 @@ def run(
         if vtk:
             _write_vtk(output, jobs, averages)
         write_artifact(output, LAYOUT, arrays, record, attributes)
-    return {"paths": [_headline(str(arrays["path_name"][k]), j, a) for k, (j, a) in enumerate(zip(jobs, averages))]}
+    return {
+        "paths": [_headline(str(arrays["path_name"][k]), j, a) for k, (j, a) in enumerate(zip(jobs, averages))],
+        "warnings": record.warnings,
+    }
+
+
+def _measures(cost: dict[str, Any]) -> list[Measure]:
+    return [
+        Measure(
+            "boundary_stress_difference", cost["boundary_stress_difference"], 0.1,
+            "stress from zones and from the forces on the outline differ by {percent}: the blocks are far from "
+            "balance; run them with more steps",
+        ),
+    ]  # fmt: skip
 
 
 def _kind(path: Path) -> str:

@@ -117,7 +117,11 @@ def run(
         "forces": "all, at every state" if whole else "normal forces between spheres, at the last state only",
     }
     write_artifact(output, LAYOUT, arrays, record, attributes)
-    return {"paths": [_headline(n, p) for n, p in zip(names, paths)], "forces": attributes["forces"]}
+    return {
+        "paths": [_headline(n, p) for n, p in zip(names, paths)],
+        "forces": attributes["forces"],
+        "warnings": record.warnings,
+    }
 
 
 def _headline(name: str, path: tuple[_Bed, float, dict[str, Any]]) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,21 +9,22 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Measure:
-    """An error measure.
+    """An error measure of a headline.
 
-    value : None where the run gives none (too few states)
-    threshold : what is larger, or not finite, is doubtful
-    sentence : says in plain words what that means and what to change; {value} and {percent} are filled in
+    value : None or nan where the run gives none (too few states)
+    threshold : what is larger is doubtful, and what is smaller than `least`
+    sentence : what that means and what to change; {value} and {percent} are filled in
     """
 
     name: str
     value: float | None
     threshold: float
     sentence: str
+    least: float = -math.inf
 
     @property
     def doubtful(self) -> bool:
-        return self.value is not None and not self.value <= self.threshold
+        return self.value is not None and (self.value < self.least or self.value > self.threshold)
 
     def __str__(self) -> str:
         value = math.nan if self.value is None else self.value
@@ -39,9 +39,3 @@ def warnings_of(measures: Iterable[Measure]) -> list[str]:
 def number(value: float) -> float | None:
     """A float for a headline; None where there is no number."""
     return float(value) if math.isfinite(value) else None
-
-
-def tell(warnings: Iterable[str]) -> None:
-    """..."""
-    for text in warnings:
-        logging.getLogger(__name__).warning(text)

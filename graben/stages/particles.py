@@ -29,6 +29,7 @@ from graben.schemas.outputs import LAST_GOOD, SERIES, Outputs, beside
 from graben.schemas.scenes.particles import ParticlesScene
 from graben.schemas.vtk import vtu_series, write_vtu
 from graben.stages.estimate import Estimate, refuse_too_large, work
+from graben.stages.measures import Measure, warnings_of
 from graben.stages.record import Progress, Record, silent
 
 # (time step over critical, kinetic energy at rest, unbalanced force ratio): docs/dem-run-particles.md has the trade
@@ -78,6 +79,7 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
         "unbalanced_force_ratio": max(b.survey.unbalanced for b in beds),
         "largest_overlap_over_radius": max(b.survey.overlap for b in beds),
     }
+    record.warnings = warnings_of(_measures(record.cost))
     with together():
         if scene.output.vtk:
             _write_vtk(output, law, beds[0])
@@ -98,7 +100,27 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
         "solid_fraction": float(np.mean([b.solid_fraction for b in beds])),
         "energy_error": record.cost["energy_error"],
         "unbalanced_force_ratio": record.cost["unbalanced_force_ratio"],
+        "largest_overlap_over_radius": record.cost["largest_overlap_over_radius"],
+        "warnings": record.warnings,
     }
+
+
+def _measures(cost: dict[str, Any]) -> list[Measure]:
+    return [
+        Measure(
+            "energy_error", cost["energy_error"], 0.025,
+            "the energy balance is off by {percent}: lower numerics.safety (time step)",
+        ),
+        Measure(
+            "largest_overlap_over_radius", cost["largest_overlap_over_radius"], 0.1,
+            "grains overlap by up to {percent} of a radius (10 % is the most that points of contact allow): lower "
+            "contact.overlap or raise contact.normal_stiffness",
+        ),
+        Measure(
+            "time_step_over_critical", cost["time_step_over_critical"], 1.0,
+            "the time step was {value} times the stable one: lower numerics.safety",
+        ),
+    ]  # fmt: skip
 
 
 def prepare(scene: ParticlesScene) -> tuple[LinearLaw, BedRecipe, list[Estimate]]:

@@ -28,6 +28,7 @@ from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.rev_study import RevStudyScene
 from graben.stages.block_history import Run, read_run
 from graben.stages.estimate import Estimate, refuse_too_large
+from graben.stages.measures import Measure, warnings_of
 from graben.stages.record import Progress, Record, silent
 from graben.stages.rev_calibration import Fits, check_law, chosen_parameters, fit_samples
 from graben.stages.workers import compute
@@ -150,10 +151,14 @@ def run(
     }
     if law is not None:
         attributes["law"] = law.law
+    none = None if advice.radius else 1.0
+    doubt = Measure("recommended_radius_m", none, 0.0, "no radius is recommended: " + advice.reason)
+    record.warnings = warnings_of([doubt])
     write_artifact(output, LAYOUT, arrays, record, attributes)
     return {
         "recommended_radius_m": advice.radius,
         "reason": advice.reason,
+        "warnings": record.warnings,
         "samples": int(arrays["area"].size),
         "realizations": len(groups),
         "properties": [_row(name, c, "_si" if law else None) for name, c in by_name.items()],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -19,10 +18,10 @@ from graben.schemas.scene import load_scene
 from graben.schemas.scenes.scratch import ScratchScene
 from graben.stages.estimate import Estimate, refuse_too_large, work
 from graben.stages.material import pack_material
+from graben.stages.measures import Measure, warnings_of
 from graben.stages.record import Progress, Record, silent
 from graben.stages.scratch_output import measure_groove, write_last_good, write_run
 
-_log = logging.getLogger(__name__)
 # Laws whose strain increments may add up to plastic strains of order 1 under the tip.
 _TAKES = ("elastic", "j2", "erve", "drucker-prager")
 _BRICK_BYTES = 2000.0
@@ -87,9 +86,7 @@ def run(
     progress(0.99, "sections")
     groove = measure_groove(scene, mesh, result)
     headline = {**groove.headline, **_cost(result)}
-    headline["warnings"] = _warnings(headline)
-    for text in headline["warnings"]:
-        _log.warning(text)
+    headline["warnings"] = record.warnings = warnings_of(_measures(headline))
     record.cost.update(result.cost)
     record.cost.update({k: headline[k] for k in ("energy_error", "hourglass_share", "kinetic_share_sliding")})
     record.cost["mesh_size_m"] = mesh_size(scene)
@@ -204,24 +201,29 @@ def _damage(scene: ScratchScene, law: Law) -> mechanics.Damage | None:
     return mechanics.Damage(scene.damage.growth_per_joule, scene.damage.remove_at, law.index("max_damage_step"))
 
 
-def _warnings(headline: dict[str, Any]) -> list[str]:
+def _measures(headline: dict[str, Any]) -> list[Measure]:
     """What a user should know before trusting the groove."""
-    found = []
-    if headline["hourglass_share"] > 0.05:
-        found.append(
-            f"work against hourglass control is {100 * headline['hourglass_share']:.0f} % of the internal energy "
-            "(5 % is the most to trust): use a smaller mesh.size or numerics.points = 8"
-        )
-    if headline["kinetic_share_sliding"] > 0.05:
-        found.append(
-            f"kinetic energy is {100 * headline['kinetic_share_sliding']:.0f} % of the internal energy "
-            "while sliding: lower numerics.slide_speed"
-        )
-    if headline["removed_elements"] > 0 and headline["degree_of_wear"] > 0.99:
-        found.append(
-            "damage removed the whole track: the degree of wear follows from the damage settings, not the steel"
-        )
-    return found
+    # Wear by damage that took everything is the setting's, not the metal's.
+    all_gone = headline["degree_of_wear"] if headline["removed_elements"] > 0 else None
+    return [
+        Measure(
+            "energy_error", headline["energy_error"], 0.015,
+            "the energy balance is off by {percent} of the work of the tip: lower the speeds in numerics",
+        ),
+        Measure(
+            "hourglass_share", headline["hourglass_share"], 0.05,
+            "work against hourglass control is {percent} of the internal energy (5 % is the most to trust): use a "
+            "smaller mesh.size or numerics.points = 8",
+        ),
+        Measure(
+            "kinetic_share_sliding", headline["kinetic_share_sliding"], 0.05,
+            "kinetic energy is {percent} of the internal energy while sliding: lower numerics.slide_speed",
+        ),
+        Measure(
+            "degree_of_wear", all_gone, 0.99,
+            "damage removed the whole track: the degree of wear follows from the damage settings, not the steel",
+        ),
+    ]  # fmt: skip
 
 
 def _cost(result: mechanics.ScratchRun) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from graben.schemas.layouts.scratch import LAYOUT
 from graben.schemas.outputs import LAST_GOOD, beside
 from graben.schemas.scenes.scratch import ScratchScene
 from graben.schemas.vtk import vtu_series, write_vtu
+from graben.stages.measures import number
 from graben.stages.record import Record
 
 _STATES = ("loaded", "unloaded")
@@ -90,21 +91,26 @@ def _headline(
     def mean(rows: list[Section], name: str) -> float:
         return float(np.mean([getattr(s, name) for s in rows]))
 
-    def wear(rows: list[Section]) -> float:
+    def wear(rows: list[Section]) -> float | None:
         ag = mean(rows, "groove_area")
-        return (ag - mean(rows, "shoulder_area")) / ag if ag > 0.0 else 0.0
+        return (ag - mean(rows, "shoulder_area")) / ag if ag > 0.0 else None
 
     travelled = result.tip[:, 0] - start
     phases = list(result.phases)
     if path > 0.0:
-        steady = (result.phase == phases.index("slide")) & (travelled >= 0.5 * path) & (travelled <= 0.95 * path)
+        sliding = result.phase == phases.index("slide")
+        steady = sliding & (travelled >= 0.5 * path) & (travelled <= 0.95 * path)
+        if not steady.any():  # a path of few steps: the record nearest to where they would be
+            off = np.where(sliding, np.abs(travelled - 0.7 * path), np.inf)
+            steady = off == off.min()
         normal, along = -result.force[steady, 2], result.force[steady, 0]
     else:
         steady = (result.phase == 0) & (np.arange(len(result.phase)) >= np.sum(result.phase == 0) - 3)
         normal, along = -result.force[steady, 2], result.force[steady, 0]
     along_path = np.array([s.degree_of_wear for s in sections[1]])
     whole = range(1, int(path / a) + 1)
-    by_path = {str(k): float(np.interp(start + k * a, positions, along_path)) for k in whole}
+    # Between sections of which one met no groove nothing is known.
+    by_path = {str(k): number(np.interp(start + k * a, positions, along_path)) for k in whole}
     return {
         "groove_area_m2": mean(rest, "groove_area"),
         "shoulder_area_m2": mean(rest, "shoulder_area"),
@@ -112,7 +118,7 @@ def _headline(
         "s_over_a": 0.5 * path / a,
         "degree_of_wear_loaded": wear(loaded),
         "degree_of_wear_by_s_over_a": by_path,
-        "degree_of_penetration": mean(rest, "degree_of_penetration"),
+        "degree_of_penetration": number(mean(rest, "degree_of_penetration")),
         "groove_width_m": mean(rest, "width"),
         "groove_depth_m": mean(rest, "depth"),
         "normal_force_n": float(normal.mean()),
@@ -132,9 +138,8 @@ def write_run(
     arrays: dict[str, Any] = {
         "groove_area": head["groove_area_m2"],
         "shoulder_area": head["shoulder_area_m2"],
-        "degree_of_wear": head["degree_of_wear"],
-        "degree_of_wear_loaded": head["degree_of_wear_loaded"],
-        "degree_of_penetration": head["degree_of_penetration"],
+        # No groove, no wear: areas of zero tell a reader.
+        **{name: head[name] or 0.0 for name in ("degree_of_wear", "degree_of_wear_loaded", "degree_of_penetration")},
         "s_over_a": head["s_over_a"],
         "normal_force": head["normal_force_n"],
         "tangential_force": head["tangential_force_n"],

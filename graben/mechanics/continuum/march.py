@@ -10,6 +10,11 @@ import numpy as np
 from graben.mechanics.continuum.body import Body, State
 from graben.mechanics.continuum.newton import Drag, NewtonOptions, Step, equilibrate
 
+_COARSE = 0.1  # of the march: steps that are too long to say where an overload begins
+_RESOLVED = 50  # steps that an end of the march is resolved by
+_LEAST = 1e-12  # of the smallest step: the first step is no smaller
+_DOWN = 0.1  # of a first step that failed, below the smallest
+
 
 @dataclass(frozen=True)
 class StepOptions:
@@ -18,6 +23,8 @@ class StepOptions:
     first, largest, smallest : a step that fails is halved; below `smallest` the march ends
     easy, hard : iterations below which the next step grows by half, and above which it shrinks by a third
     extrapolate : start each step from the last increment, scaled
+    resolve : find an early end too, to 2 %: `smallest` is at most a fiftieth of what was marched, and before
+        the first step a trillionth of itself
     """
 
     first: float
@@ -26,10 +33,17 @@ class StepOptions:
     easy: int = 6
     hard: int = 12
     extrapolate: bool = True
+    resolve: bool = False
 
     def __post_init__(self) -> None:
         if not 0 < self.smallest <= self.first <= self.largest:
             raise ValueError("step lengths must satisfy 0 < smallest <= first <= largest")
+
+    def least_after(self, marched: float) -> float:
+        """Length below which a step that fails is not halved again, s."""
+        if not self.resolve:
+            return self.smallest
+        return min(self.smallest, marched / _RESOLVED) if marched > 0.0 else self.smallest * _LEAST
 
 
 @dataclass
@@ -79,7 +93,8 @@ def march(
     prescribed: Callable[[float], np.ndarray] | None = None,
     save_times: np.ndarray | None = None,
     relaxation: float = 0.0,
-    accepted: Callable[[float, State, np.ndarray, Step], str | None] | None = None,
+    accepted: Callable[[float, State, np.ndarray, Step], None] | None = None,
+    overloaded: Callable[[float, Step], str | None] | None = None,
 ) -> March:
     """Follow the load history from `begin` to `end`, s.
 
@@ -89,8 +104,9 @@ def march(
     prescribed : displacement of `body.fixed`, m, at a time; None: stays as it is in `start`
     save_times : times that a step must end on
     relaxation : relaxation time, s, of the viscous stabilisation (see `newton.Drag`); 0: none
-    accepted : called after each equilibrium with time, state, internal forces and the step; a text that it
-        returns ends the march, not complete, for that reason
+    accepted : called after each equilibrium with time, state, internal forces and the step
+    overloaded : told of each equilibrium before; a text that it returns makes this one the last, not complete, for
+        that reason. A step of more than a tenth of the march is halved first
 
     Returns
     -------
@@ -128,11 +144,12 @@ def march(
             # The path may have bent: once more from rest before the step is halved.
             step = equilibrate(body, run.state, new_load, supports(target), newton, None, resist)
             run.factorisations += step.iterations
-        if not step.converged:
+        ended = overloaded(target, step) if overloaded is not None and step.converged else None
+        if not step.converged or (ended and steps.resolve and taken > _COARSE * (target - begin)):
             run.rejected += 1
-            run.reason = step.reason
-            length = 0.5 * taken
-            if length < steps.smallest:
+            run.reason = ended or step.reason
+            length = 0.5 * taken if run.iterations or taken > steps.smallest else _DOWN * taken
+            if length < steps.least_after(run.time - begin):
                 return run
             continue
         increment = step.state.displacement - run.state.displacement
@@ -141,14 +158,15 @@ def march(
         run.time, run.state, run.force, load = target, step.state, step.force, new_load
         run.iterations.append(step.iterations)
         run.residuals.append(step.residuals)
-        ended = accepted(run.time, run.state, run.force, step) if accepted is not None else None
+        if accepted is not None:
+            accepted(run.time, run.state, run.force, step)
         if ended:
             run.reason = ended
             return run
         if step.iterations <= steps.easy:
             length = min(1.5 * max(length, taken), steps.largest)
         elif step.iterations > steps.hard:
-            length = max(taken * 2 / 3, steps.smallest)
+            length = max(taken * 2 / 3, min(taken, steps.smallest))
     run.complete, run.reason = True, ""
     return run
 
