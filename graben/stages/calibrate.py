@@ -151,9 +151,11 @@ def run(
                 others, measured, state, lambda part, words: progress(share * 2 + (0.95 - 2 * share) * part, words)
             )
             candidates = [first, *rest]
+    data = slice(0, fit.groups.size)  # priors follow
     known = identify(
-        best.x, best.residuals[: fit.groups.size], best.jacobian[: fit.groups.size], groups=fit.groups,
-        lag=scene.correlation_length, precision=problem.priors.precision(problem.box.size), beside=settled.moved,
+        best.x, best.residuals[data], best.jacobian[data], groups=fit.groups, lag=scene.correlation_length,
+        precision=problem.priors.precision(problem.box.size), beside=settled.beside[data], noise=settled.noise[data],
+        floor=fit.floor,
     )  # fmt: skip
     near = found.member_values <= _NEAR * found.best.value
     members = distinct(found.members[near])

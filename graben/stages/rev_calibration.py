@@ -131,10 +131,10 @@ def fit_samples(
     first = task(radii - 1, middle, groups[0], _FIRST[scene.fidelity], None)
     fit, found = first.solve()
     best = found.best
+    slopes, coarse = (jacobian(lambda u: fit.residuals(box.to_values(u)), best.x, step) for step in (1e-4, 2e-4))
     known = identify(
-        best.x, best.residuals, jacobian(lambda u: fit.residuals(box.to_values(u)), best.x, 1e-4),
-        groups=fit.groups, lag=first.lag,
-    )  # fmt: skip
+        best.x, best.residuals, slopes, groups=fit.groups, lag=first.lag, noise=coarse - slopes, floor=fit.floor
+    )
     sets, iterations = _EACH[scene.fidelity]
     guesses = found.members[:sets]
     each = Plan(starts=1, particles=len(guesses), generations=0, refine_best=len(guesses), iterations=iterations)

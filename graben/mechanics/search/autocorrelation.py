@@ -41,16 +41,18 @@ def _expected(parts: list[Array], rho: float) -> tuple[float, Array]:
     return float(lagged), squares
 
 
-def lasting_meat(j: Array, r: Array, groups: NDArray[np.int64]) -> tuple[Array, float]:
+def lasting_meat(j: Array, r: Array, groups: NDArray[np.int64], beside: Array | None = None) -> tuple[Array, float]:
     """J^T S J (k, k) with S the covariance of errors estimated from residuals r (m,) with Jacobian j (m, k), and rho.
 
-    groups (m,) as in `identify`; groups of less than three points have no scatter of their own and are left out.
+    groups (m,), beside (m, b) as in `identify`; groups of less than three points have no scatter of their own and are
+    left out.
     """
     k = j.shape[1]
     members = [np.flatnonzero(groups == g) for g in np.unique(groups)]
     members = [b for b in members if len(b) > 2]
     if not members or not np.any(r):
         return np.zeros((k, k)), 0.0
+    taken = j if beside is None else np.concatenate([j, beside], axis=1)
     square = np.array([max(float(r[b] @ r[b]), 1e-300) for b in members])
     counts = np.array([len(b) for b in members])
     variance, rho = square / counts, 0.0
@@ -58,7 +60,7 @@ def lasting_meat(j: Array, r: Array, groups: NDArray[np.int64]) -> tuple[Array, 
         size = np.ones(len(r))
         for b, v in zip(members, variance):
             size[b] = np.sqrt(v)
-        basis = np.linalg.qr(j / size[:, None])[0]
+        basis = np.linalg.qr(taken / size[:, None])[0]
         parts = [basis[b] for b in members]
         shown = sum(float(r[b][1:] @ r[b][:-1]) / v for b, v in zip(members, variance)) / np.sum(square / variance)
         low, high = 0.0, _LARGEST

@@ -260,6 +260,19 @@ class CurveFit:
         seated = (self._seats[:, 1] == 1) & (self._controls[:, 1] == 0)
         return seated & np.array([1 in c.fit_stress for c in self.curves])
 
+    @property
+    def zeros_free(self) -> NDArray[np.bool_]:
+        """(curves,) where lateral strain is compared, and so counts from a first reading."""
+        return np.array([0 in c.fit_strain and self.weights.strain > 0.0 for c in self.curves])
+
+    @property
+    def floor(self) -> float:
+        """Root mean square of what the driver's tolerance leaves in a residual: it holds prescribed stresses to that
+        part of the largest stress, and observed quantities are no better."""
+        curve, _row, column = self._where
+        largest = np.array([[np.abs(d).max(axis=0) for d in (c.stress, c.strain)] for c in self.curves])
+        return self.tolerance * _rms(np.nan_to_num(largest[curve, self._kind, column]) * self._weight)
+
     def predict(self, values: Array, shifts: Array | None = None) -> Predictions:
         """Responses of candidates `values` (c, k), parameter values in SI in the order of `free`.
 
@@ -303,13 +316,15 @@ class CurveFit:
 
     def residuals(self, values: Array, shifts: Array | None = None) -> Array:
         """Weighted residuals (c, m): one per compared point, then one per curve for the part of it without
-        solution; shifts as in `predict`.
+        solution. shifts (c, 2, curves): to the first axial stress as in `predict`, and to the zero of lateral strain.
 
         Rows are contiguous whatever c is: numpy adds up in another order where they are not, and sums of one point
         would depend on how many others came with it."""
-        found = self.predict(values, shifts)
+        found = self.predict(values, None if shifts is None else shifts[:, 0])
         curve, row, column = self._where
         model = np.where(self._kind == 0, found.stress[:, curve, row, column], found.strain[:, curve, row, column])
+        if shifts is not None:
+            model = model + np.where((self._kind == 1) & (column == 0), shifts[:, 1, :][:, curve], 0.0)
         # what was moved counts too: a search would not find back over values that make no difference
         missing = np.clip(1.0 - found.reached / (self._rows - 1), 0.0, 2.0) + found.moved[:, None]
         # a strain that runs away must not overflow the sum of squares

@@ -62,7 +62,7 @@ class Objective:
         return self.noise * math.sqrt((1.0 + self.lag) / self.fit.points)
 
     def data(self, unit: Array, shifts: Array | None = None) -> Array:
-        """(c, k) -> (c, m): residuals of the curves alone; shifts (c, curves) as in `CurveFit.predict`."""
+        """(c, k) -> (c, m): residuals of the curves alone; shifts as in `CurveFit.residuals`."""
         return self.fit.residuals(self.box.to_values(unit), shifts)
 
     def __call__(self, unit: Array, shifts: Array | None = None) -> Array:
