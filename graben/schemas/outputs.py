@@ -86,9 +86,10 @@ class Outputs:
             if path not in taken:
                 faults += self._faults_of(path, overwrite or (restart and path in self._kept))
         faults += self._twin()
+        faults += [f for p in paths for f in _misplaced(p)] if not faults else []
         if faults:
             raise BadInput(faults)
-        for path in {p.parent.absolute(): p for p in paths}.values():
+        for path in {p.parent.absolute(): p for p in reversed(paths)}.values():
             _try_to_write(path)
 
     def _clashes(self, inputs: list[Path]) -> Iterator[Fault]:
@@ -161,19 +162,20 @@ def files_of(scene: Any) -> list[Path]:
     return [scene.source.path, *walk(scene)]
 
 
-def _try_to_write(path: Path) -> None:
-    """Raise what stands against a file there; nothing is left, not even a folder."""
+def _misplaced(path: Path) -> Iterator[Fault]:
+    """Names that are too long, and a file where the path has a folder."""
     folder = existing_folder(path)
-    between = path.absolute()
-    for name in (*between.relative_to(folder).parts[:-1], part_of(path).name):
+    for name in (*path.absolute().relative_to(folder).parts[:-1], part_of(path).name):
         if len(os.fsencode(name)) > 255:
-            raise BadInput(Fault(str(path), "", "", f"a shorter name ({len(os.fsencode(path.name))} bytes)"))
-    above = between.parent
-    while above != folder:
-        if os.path.lexists(above):
-            raise BadInput(Fault(str(path), "", "", f"a folder to write to; {above} is none"))
-        above = above.parent
-    with machine(path), tempfile.NamedTemporaryFile(dir=folder, prefix=".", suffix=".part") as probe:
+            yield Fault(str(path), "", "", f"shorter names (the longest that is needed: {name})")
+    for above in path.absolute().parents:
+        if above != folder and folder in above.parents and os.path.lexists(above):
+            yield Fault(str(path), "", "", f"a folder to write to; {above} is none")
+
+
+def _try_to_write(path: Path) -> None:
+    """Raise MachineFailed where no file can be written; nothing is left, not even a folder."""
+    with machine(path), tempfile.NamedTemporaryFile(dir=existing_folder(path), prefix=".", suffix=".part") as probe:
         probe.write(bytes(_ROOM))
         probe.flush()
 
