@@ -7,13 +7,14 @@ is used, so that no damaged index gets into compiled code.
 from __future__ import annotations
 
 import hashlib
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault
+from graben.errors import BadInput, Fault, MachineFailed
 from graben.schemas.files import whole_file
 
 Arrays = dict[str, np.ndarray]
@@ -21,11 +22,19 @@ Arrays = dict[str, np.ndarray]
 _DIGEST = "sha256"
 
 
-def write_saved(path: Path, owner: Mapping[str, str], arrays: Mapping[str, Any]) -> None:
-    """Write arrays (numbers or text) by name; owner: what they belong to, by the names of its marks."""
+def write_saved(path: Path, owner: Mapping[str, str], arrays: Mapping[str, Any]) -> bool:
+    """Write arrays (numbers or text) by name; owner: what they belong to, by the names of its marks.
+
+    False, with a warning, where the machine refuses: the run itself may still come to its end.
+    """
     stored = {name: np.asarray(values) for name, values in {**owner, **arrays}.items()}
-    with whole_file(path) as temporary:
-        np.savez(temporary, **stored, **{_DIGEST: np.array(_digest(stored))})  # type: ignore[arg-type]
+    try:
+        with whole_file(path) as temporary:
+            np.savez(temporary, **stored, **{_DIGEST: np.array(_digest(stored))})  # type: ignore[arg-type]
+    except MachineFailed as error:
+        logging.getLogger(__name__).warning("no state is kept: %s", error)
+        return False
+    return True
 
 
 def read_saved(path: Path, owner: Mapping[str, str], expected: str) -> Arrays:

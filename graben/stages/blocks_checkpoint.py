@@ -48,14 +48,14 @@ class Keeper:
             self.write()
 
     def write(self) -> Path | None:
-        """Put the last state on disk; None where there is none yet."""
+        """Put the last state on disk; None where there is none yet, or no room."""
         if self._history is None:
             return None
         rows = self._history.stored(int(self._last["states"]))
         stored = self._last | {f"history.{k}": v for k, v in rows.items()}
-        write_saved(path_for(self.output), _marks(self.scene), stored)
         self._written = time.monotonic()
-        return path_for(self.output)
+        written = write_saved(path_for(self.output), _marks(self.scene), stored)
+        return path_for(self.output) if written else None
 
     def stopped(self) -> None:
         """The run was interrupted or failed: leave the last state on disk and say so."""

@@ -92,3 +92,14 @@ def test_a_file_of_another_owner_names_what_differs(file):
         read_saved(file, {**OWNER, "scene": "def"}, "that of this one")
     with pytest.raises(BadInput, match="another version"):
         read_saved(file, {**OWNER, "version": "2"}, "that of this one")
+
+
+def test_a_run_goes_on_where_its_state_finds_no_room_and_the_former_one_stays(file, caplog, monkeypatch):
+    def full(*arguments, **options):
+        raise OSError(28, "No space left on device")
+
+    before = file.read_bytes()
+    monkeypatch.setattr(np, "savez", full)
+    assert not write_saved(file, OWNER, ARRAYS)
+    assert "no state is kept" in caplog.text and "No space left" in caplog.text
+    assert file.read_bytes() == before and list(file.parent.iterdir()) == [file]
