@@ -174,3 +174,12 @@ def test_names_are_short_and_in_one_line(name):
     tables = tomllib.loads(template("wear"))
     tables["mixtures"][0]["name"] = name
     assert refused("wear", tables)
+
+
+@pytest.mark.parametrize("gone", ["corners", "patches"])
+def test_a_mapped_mesh_has_corners_and_patches(gone):
+    tables = tomllib.loads(template("fem"))
+    tables["mesh"][gone] = []
+    assert refused("fem", tables)
+    tables["mesh"]["method"] = "paved"
+    assert not refused("fem", tables)

@@ -119,6 +119,8 @@ class Mesh(Model):
     def _file_for_method(self) -> Self:
         if self.method == "file" and self.file is None:
             raise ValueError('a mesh file, because method = "file"')
+        if self.method == "mapped" and not (self.corners and self.patches):
+            raise ValueError('corners and patches, because method = "mapped"')
         if self.method == "paved" and len(self.outline) < 3:
             raise ValueError("an outline of at least three points")
         return self
