@@ -10,11 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from graben.errors import BadInput, Fault, NotFinite
+from graben.schemas.artifact_marks import DIGEST, attribute_faults, content_digest
 from graben.schemas.files import whole_file
 from graben.schemas.provenance import Record
 
 if TYPE_CHECKING:
     import xarray
+
+PARTIAL = "partial"
+"""Global attribute of an artifact that a failed run kept: why it stopped."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,8 @@ class Variable:
     dtype : numpy dtype; "S" or "U" for text
     optional : may be absent
     may_be_nan : nan marks "no value here" (padding, a measure that does not exist); elsewhere nan is a fault
+    index_of : the dim that its values are indices of; "dim or -1" where -1 marks none
+    sum_of : the dim whose length its values add up to
     """
 
     dims: tuple[str, ...]
@@ -34,12 +40,17 @@ class Variable:
     dtype: str = "f8"
     optional: bool = False
     may_be_nan: bool = False
+    index_of: str = ""
+    sum_of: str = ""
     attributes: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What an artifact of one kind holds. `version` grows when a reader of the old one would fail."""
+    """What an artifact of one kind holds. `version` grows when a reader of the old one would fail.
+
+    attributes : global attributes with their values; own_attributes : those that differ from run to run, by type
+    """
 
     kind: str
     version: int
@@ -47,6 +58,7 @@ class Layout:
     dims: Mapping[str, str]
     variables: Mapping[str, Variable]
     attributes: Mapping[str, str] = field(default_factory=dict)
+    own_attributes: Mapping[str, type] = field(default_factory=dict)
 
 
 def write_artifact(
@@ -55,8 +67,12 @@ def write_artifact(
     arrays: Mapping[str, Any],
     record: Record,
     attributes: Mapping[str, Any] | None = None,
+    partial: str = "",
 ) -> None:
     """Check `arrays` against `layout` and write them as one NetCDF-4 file, whole or not at all.
+
+    partial : why the run stopped before its end; such an artifact bears that as a mark, and nan where its numbers
+        are not finite
 
     Raises
     ------
@@ -74,9 +90,12 @@ def write_artifact(
         array = np.asarray(values)
         if array.dtype.kind not in "SUO":
             array = array.astype(declared.dtype)
+        if partial and array.dtype.kind == "f":
+            array = np.where(np.isfinite(array), array, np.nan)
         if array.ndim != len(declared.dims):
             raise ValueError(f"{layout.kind}: {name} has shape {array.shape}, expected dims {declared.dims}")
-        _refuse_non_finite(layout.kind, name, declared, array)
+        if not partial:
+            _refuse_non_finite(layout.kind, name, declared, array)
         about = {"units": declared.units, "long_name": declared.long_name, **declared.attributes}
         variables[name] = (declared.dims, array, about)
     missing = [n for n, v in layout.variables.items() if not v.optional and n not in arrays]
@@ -92,18 +111,21 @@ def write_artifact(
             **layout.attributes,
             **record.attributes(),
             **(attributes or {}),
+            **({PARTIAL: partial} if partial else {}),
         },
     )
+    dataset.attrs[DIGEST] = content_digest(dataset)
     # Bit-reproducible data: no time stamps, fixed compression.
+    small = {"fletcher32": True}
     encoding: dict[Any, dict[str, Any]] = {
-        n: {"zlib": True, "complevel": 1, "shuffle": True}
+        n: {**small, "zlib": True, "complevel": 1, "shuffle": True} if v.size > 4096 else dict(small)
         for n, v in dataset.variables.items()
-        if v.ndim and v.dtype.kind in "fiu" and v.size > 4096
+        if v.ndim and v.size and v.dtype.kind in "fiu"
     }
     for name, declared in layout.variables.items():
         if name in dataset.variables and dataset[name].dtype.kind == "f":
-            encoding.setdefault(name, {})["_FillValue"] = np.nan if declared.may_be_nan else None
-    with whole_file(path) as temporary:
+            encoding.setdefault(name, {})["_FillValue"] = np.nan if declared.may_be_nan or partial else None
+    with whole_file(path, ends_run=not partial) as temporary:
         try:
             dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
         except RuntimeError as error:
@@ -119,20 +141,19 @@ def _refuse_non_finite(kind: str, name: str, declared: Variable, array: np.ndarr
         raise NotFinite(f"{kind}: {name} holds {int(bad.sum())} values that are not finite, the first at {first}")
 
 
-def read_artifact(path: str | Path, kind: str | Iterable[str]) -> xarray.Dataset:
+def read_artifact(path: str | Path, kind: str | Iterable[str], *, partial: bool = False) -> xarray.Dataset:
     """Read an artifact into memory after checking it against its layout.
+
+    partial : take what a failed run kept even where it holds nan
 
     Raises
     ------
     BadInput : not a file, not NetCDF, foreign, of another kind, newer than this software, or with faults
     """
-    import xarray
-
-    faults = check_artifact(path, [kind] if isinstance(kind, str) else list(kind))
-    if faults:
+    faults, dataset = _read(Path(path), [kind] if isinstance(kind, str) else list(kind), partial)
+    if dataset is None:
         raise BadInput(faults)
-    with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as dataset:
-        return dataset.load()
+    return dataset
 
 
 def check_artifact(path: str | Path, kinds: Iterable[str] | None = None) -> list[Fault]:
@@ -140,31 +161,61 @@ def check_artifact(path: str | Path, kinds: Iterable[str] | None = None) -> list
 
     kinds : those the caller takes; None for any known one
     """
+    from graben.schemas.kinds import LAYOUTS
+
+    return _read(Path(path), list(kinds) if kinds is not None else list(LAYOUTS), True)[0]
+
+
+def kind_of(path: Path) -> str:
+    """Kind of an artifact as it calls itself; "" where it cannot be told (reading it will say why)."""
     import xarray
 
+    try:
+        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as data:
+            return str(data.attrs.get("schema_kind", ""))
+    except Exception:
+        return ""
+
+
+def _read(path: Path, accepted: list[str], partial: bool) -> tuple[list[Fault], xarray.Dataset | None]:
+    """Every fault, or none and the data."""
+    import xarray
+
+    file = str(path)
+    if not path.is_file():
+        return [Fault(file, "", "", "an existing artifact file")], None
+    try:
+        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as dataset:
+            faults = _faults(file, path.stat().st_size, dataset, accepted, partial)
+            return faults, None if faults else dataset.load()
+    except Exception as error:  # whatever damaged bytes make of HDF5, netCDF and xarray
+        return [Fault(file, "", "", f"a whole NetCDF-4 file ({error})")], None
+
+
+def _faults(file: str, size: int, dataset: xarray.Dataset, accepted: list[str], partial: bool) -> list[Fault]:
     from graben.schemas.kinds import LAYOUTS, layout
 
-    path = Path(path)
-    if not path.is_file():
-        return [Fault(str(path), "", "", "an existing artifact file")]
-    try:
-        dataset = xarray.open_dataset(path, engine="netcdf4", decode_times=False)
-    except (OSError, ValueError, RuntimeError) as error:
-        return [Fault(str(path), "", "", f"a whole NetCDF-4 file ({error})")]
-    with dataset:
-        kind = dataset.attrs.get("schema_kind")
-        accepted = list(kinds) if kinds is not None else list(LAYOUTS)
-        if kind not in accepted or kind not in LAYOUTS:
-            shown = repr(kind) if kind is not None else "(absent: not an artifact of graben)"
-            return [Fault(str(path), "schema_kind", shown, " or ".join(map(repr, accepted)))]
-        declared = layout(str(kind))
-        version = int(dataset.attrs.get("schema_version", 0))
-        if version > declared.version:
-            return [Fault(str(path), "schema_version", str(version), f"at most {declared.version}; update graben")]
-        return _variable_faults(str(path), declared, dataset)
+    kind = str(dataset.attrs.get("schema_kind", "(absent: not an artifact of graben)"))
+    if kind not in accepted or kind not in LAYOUTS:
+        return [Fault(file, "schema_kind", repr(kind), " or ".join(map(repr, accepted)))]
+    # Deflated bytes grow by a factor of 1032 at most: a larger size is damage, and would not fit into memory.
+    if dataset.nbytes > 1100 * size + 1_000_000:
+        return [Fault(file, "", f"{size} bytes", f"a file that holds its {dataset.nbytes} bytes of data")]
+    declared = layout(kind)
+    version = dataset.attrs.get("schema_version")
+    if not isinstance(version, int | np.integer):
+        return [Fault(file, "schema_version", repr(version), "a whole number")]
+    if version > declared.version:
+        return [Fault(file, "schema_version", str(version), f"at most {declared.version}; update graben")]
+    faults = [Fault(file, *found) for found in attribute_faults(dataset.attrs, declared.own_attributes)]
+    faults += _variable_faults(file, declared, dataset, partial and PARTIAL in dataset.attrs)
+    stored = dataset.attrs.get(DIGEST)
+    if not faults and stored is not None and stored != content_digest(dataset):
+        faults.append(Fault(file, DIGEST, str(stored)[:12], "the digest of what the file holds; it is damaged"))
+    return faults
 
 
-def _variable_faults(file: str, declared: Layout, dataset: xarray.Dataset) -> list[Fault]:
+def _variable_faults(file: str, declared: Layout, dataset: xarray.Dataset, partial: bool) -> list[Fault]:
     faults = []
     for name, variable in declared.variables.items():
         if name not in dataset.variables:
@@ -176,18 +227,40 @@ def _variable_faults(file: str, declared: Layout, dataset: xarray.Dataset) -> li
             faults.append(Fault(file, f"{name}.dims", str(tuple(found.dims)), str(variable.dims)))
             continue
         units = found.attrs.get("units")
-        if units != variable.units:
+        if str(units) != variable.units:
             faults.append(Fault(file, f"{name}.units", repr(units), repr(variable.units)))
         try:
             values = np.asarray(found.values)
-        except (OSError, RuntimeError, ValueError) as error:
-            faults.append(Fault(file, name, "", f"readable data ({error}); the file seems truncated"))
+        except Exception as error:  # as above, of one variable
+            faults.append(Fault(file, name, "", f"readable data ({error}); the file seems damaged"))
             continue
-        if values.dtype.kind != "f" or values.size == 0:
+        wanted = "SUO" if variable.dtype in ("S", "U") else "fiub"
+        if values.dtype.kind not in wanted:
+            faults.append(Fault(file, name, str(values.dtype), "text" if wanted == "SUO" else "numbers"))
             continue
-        if not variable.may_be_nan and not np.isfinite(values).all():
-            bad = int((~np.isfinite(values)).sum())
-            faults.append(Fault(file, name, f"{bad} of {values.size} values nan or infinite", "finite numbers"))
-        elif variable.may_be_nan and np.isnan(values).all() and not variable.optional:
-            faults.append(Fault(file, name, "nan throughout", "at least one number"))
+        faults += _value_faults(file, name, variable, values, dict(dataset.sizes), partial)
     return faults
+
+
+def _value_faults(
+    file: str, name: str, variable: Variable, values: np.ndarray, sizes: dict[Any, int], partial: bool
+) -> list[Fault]:
+    if values.size == 0:
+        return []
+    if variable.index_of:
+        dim, _, none = variable.index_of.partition(" or ")
+        least, most = int(none or 0), sizes.get(dim, 0) - 1
+        if not (values.min() >= least and values.max() <= most):
+            span = f"{values.min()} to {values.max()}"
+            return [Fault(file, name, span, f"indices from {least} to {most}")]
+    if variable.sum_of and (values.min() < 0 or values.sum() != sizes.get(variable.sum_of, 0)):
+        expected = f"a sum of {sizes.get(variable.sum_of, 0)}, the length of dim {variable.sum_of}"
+        return [Fault(file, name, f"sum {values.sum()}", expected)]
+    if values.dtype.kind != "f" or partial:
+        return []
+    if not variable.may_be_nan and not np.isfinite(values).all():
+        bad = int((~np.isfinite(values)).sum())
+        return [Fault(file, name, f"{bad} of {values.size} values nan or infinite", "finite numbers")]
+    if variable.may_be_nan and np.isnan(values).all() and not variable.optional:
+        return [Fault(file, name, "nan throughout", "at least one number")]
+    return []

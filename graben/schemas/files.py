@@ -14,15 +14,24 @@ from pathlib import Path
 from graben import interrupts
 from graben.errors import MachineFailed
 
-_Parts = list[tuple[Path, Path]]
+
+class _Parts(list[tuple[Path, Path]]):
+    """Temporary paths and targets of files that wait to be renamed."""
+
+    ends_run = False
+
+
 _waiting: ContextVar[_Parts | None] = ContextVar("files that wait to be renamed", default=None)
 
 
 @contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
+def whole_file(path: str | Path, *, ends_run: bool = False) -> Iterator[Path]:
     """Yield a temporary path in the target's folder; rename it to `path` on success, remove it on any error.
 
-    The temporary path may become a folder. Within `together` the renaming waits for the end of that block.
+    The temporary path may become a folder. Within `together` the renaming waits for the end of that block. Signals
+    wait until the file is written, for the libraries that write would leave a broken one.
+
+    ends_run : once this file is in place the run is done, and signals are passed over
 
     Raises
     ------
@@ -33,8 +42,10 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     with together() as parts, machine(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         parts.append((temporary, path))
+        parts.ends_run |= ends_run
         try:
-            yield temporary
+            with interrupts.held():
+                yield temporary
         except BaseException:
             parts.remove((temporary, path))
             with suppress(OSError):
@@ -52,13 +63,15 @@ def together() -> Iterator[_Parts]:
     if outer is not None:
         yield outer
         return
-    parts: _Parts = []
+    parts = _Parts()
     token = _waiting.set(parts)
     try:
         yield parts
-        if parts:
-            with interrupts.held():
+        with interrupts.held():
+            if parts:
                 _put_in_place(parts)
+            if parts.ends_run:
+                interrupts.complete()
     finally:
         _waiting.reset(token)
         for temporary, _ in parts:

@@ -11,7 +11,7 @@ import numpy as np
 from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.averaging.history import Average, average
 from graben.mechanics.averaging.rev import Circle, Polygon, Rev
-from graben.schemas.artifact import write_artifact
+from graben.schemas.artifact import kind_of, write_artifact
 from graben.schemas.files import together
 from graben.schemas.layouts.curves import LAYOUT
 from graben.schemas.outputs import SERIES, Outputs
@@ -80,7 +80,7 @@ def run(
         raise BadInput(Fault("homogenize", "--radius, --polygon", "", "either a radius or a polygon"))
     pictures = () if steps_picture is None else (steps_picture,)
     Outputs(output, SERIES if vtk else (), others=pictures).claim(inputs, overwrite=overwrite)
-    kinds = [_kind(path) for path in _existing(inputs)]
+    kinds = [kind_of(path) for path in _existing(inputs)]
     if "particles" in kinds:
         return _spheres(inputs, kinds, output, radii, centre, deformed, chosen_at, steps_picture or vtk, progress)
     if centre is not None and len(centre) != 2:
@@ -130,17 +130,6 @@ def _measures(cost: dict[str, Any]) -> list[Measure]:
             "balance; run them with more steps",
         ),
     ]  # fmt: skip
-
-
-def _kind(path: Path) -> str:
-    """Kind of an artifact; "" where it cannot be told (reading it will say why)."""
-    import xarray
-
-    try:
-        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as data:
-            return str(data.attrs.get("schema_kind", ""))
-    except (OSError, ValueError, RuntimeError):
-        return ""
 
 
 def _spheres(

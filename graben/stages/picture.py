@@ -24,7 +24,7 @@ def run(artifact: Path, output: Path, *, overwrite: bool = False) -> None:
     if output.suffix not in FORMATS:
         raise BadInput(Fault(str(output), "", "", "a picture name ending in " + ", ".join(FORMATS)))
     Outputs(output).claim([artifact], overwrite=overwrite)
-    dataset = read_artifact(artifact, LAYOUTS)
+    dataset = read_artifact(artifact, LAYOUTS, partial=True)
     import matplotlib
 
     matplotlib.use("Agg")
@@ -33,5 +33,5 @@ def run(artifact: Path, output: Path, *, overwrite: bool = False) -> None:
     drawer = import_module("graben.stages.show." + dataset.attrs["schema_kind"].replace("-", "_"))
     figure = Figure(figsize=(10, 7), layout="constrained")
     drawer.draw(dataset, figure)
-    with whole_file(output) as temporary:
+    with whole_file(output, ends_run=True) as temporary:
         figure.savefig(temporary, dpi=130)

@@ -51,13 +51,13 @@ def run(folder: Path, output: Path, *, overwrite: bool = False, progress: Progre
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
         f"<style>{_STYLE}</style></head><body><h1>{html.escape(title)}</h1>\n{body}\n</body></html>\n"
     )
-    with whole_file(output) as temporary:
+    with whole_file(output, ends_run=True) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return {"report": str(output), "artifacts": len(artifacts)}
 
 
 def _section(artifact: Path, png: bytes) -> str:
-    attributes = read_artifact(artifact, LAYOUTS).attrs
+    attributes = read_artifact(artifact, LAYOUTS, partial=True).attrs
     cost = json.loads(attributes["cost"])
     inputs = json.loads(attributes["inputs"])
     facts = {

@@ -89,6 +89,40 @@ def test_a_signal_at_any_step_of_a_stage_leaves_nothing(place, number, tmp_path,
     assert signal.getsignal(number) == before
 
 
+def test_a_signal_while_a_library_writes_waits_for_it(tmp_path, monkeypatch):
+    import xarray
+
+    real, written = xarray.Dataset.to_netcdf, []
+
+    def signalled(self, path, **named):
+        kill_self()
+        real(self, path, **named)
+        written.append(path)
+
+    monkeypatch.setattr(xarray.Dataset, "to_netcdf", signalled)
+    result = command("wear-estimate", PIPELINES / "wear/astm-g65-mixtures.toml", "-o", tmp_path / "out.nc")
+    assert result.exit_code == 130, result.output
+    assert len(written) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_signal_while_the_output_is_put_in_place_lets_the_run_end_as_done(tmp_path, monkeypatch):
+    from graben.schemas import files
+
+    real = files._put_in_place
+
+    def signalled(parts):
+        kill_self()
+        real(parts)
+        kill_self(signal.SIGINT)
+
+    monkeypatch.setattr(files, "_put_in_place", signalled)
+    result = command("wear-estimate", PIPELINES / "wear/astm-g65-mixtures.toml", "-o", tmp_path / "out.nc", "--json")
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith("{")
+    assert [path.name for path in tmp_path.iterdir()] == ["out.nc"]
+
+
 def test_an_interrupt_that_became_another_error_is_an_interrupt():
     def body():
         try:

@@ -1,5 +1,8 @@
 """Artifacts: what was written is read back; every fault of a foreign, broken or newer file is named."""
 
+import random
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -114,3 +117,87 @@ def test_layouts_of_all_kinds_declare_dims_units_and_names():
             assert variable.long_name, (kind, name)
             assert variable.units, (kind, name)
             assert set(variable.dims) <= set(declared.dims), (kind, name)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "key"),
+    [
+        ("cost", None, "cost"),
+        ("cost", "{broken", "cost"),
+        ("cost", "[1]", "cost"),
+        ("cost", 3.0, "cost"),
+        ("inputs", '"text"', "inputs"),
+        ("scene", "kind = 'other'", "scene_sha256"),
+        ("seed", "one", "seed"),
+        ("schema_version", "two", "schema_version"),
+        ("schema_version", 1.5, "schema_version"),
+        ("schema_kind", [1, 2], "schema_kind"),
+        ("machine", "elsewhere", "content_sha256"),
+    ],
+)
+def test_damaged_attributes_are_named(tmp_path, name, value, key):
+    import xarray
+
+    with xarray.open_dataset(write(tmp_path / "a.nc")) as data:
+        data = data.load()
+    data.attrs.pop(name) if value is None else data.attrs.update({name: value})
+    data.to_netcdf(tmp_path / "b.nc")
+    assert key in [fault.key for fault in check_artifact(tmp_path / "b.nc")]
+
+
+def test_changed_numbers_are_noticed(tmp_path):
+    import netCDF4
+
+    path = write(tmp_path / "a.nc")
+    with netCDF4.Dataset(path, "a") as data:
+        data["count"][...] = 4  # a scalar, for which HDF5 keeps no checksum
+    assert [fault.key for fault in check_artifact(path)] == ["content_sha256"]
+
+
+def test_files_cut_off_or_with_flipped_bytes_are_refused_or_read_as_written(tmp_path):
+    path = write(tmp_path / "a.nc", gap=[np.nan, 1.0, 2.0])
+    whole, dice = path.read_bytes(), random.Random(1)
+    for tenth in range(10):
+        path.write_bytes(whole[: tenth * len(whole) // 10])
+        assert check_artifact(path)
+    for _ in range(150):
+        damaged = bytearray(whole)
+        for _ in range(dice.choice((1, 1, 4))):
+            damaged[dice.randrange(len(whole))] ^= 1 << dice.randrange(8)
+        path.write_bytes(damaged)
+        if not check_artifact(path):
+            data = read_artifact(path, "sample")
+            assert data.force.values.tolist() == [0.0, 1.0, 2.0]
+            assert int(data["count"]) == 3
+
+
+def test_sizes_that_no_file_of_that_length_holds_are_refused(tmp_path):
+    import netCDF4
+
+    path = write(tmp_path / "a.nc")
+    with netCDF4.Dataset(path, "a") as data:
+        data.createDimension("huge", 10**12)
+        data.createVariable("gap", "f8", ("huge",), chunksizes=(1000,))
+    assert "bytes of data" in check_artifact(path)[0].expected
+
+
+def test_indices_out_of_range_are_named(tmp_path, monkeypatch):
+    variables = {**LAYOUT.variables, "of": Variable(("row",), "1", "row", dtype="i4", index_of="row or -1")}
+    monkeypatch.setattr(kinds, "layout", lambda kind: replace(LAYOUT, variables=variables))
+    for values, sound in (([-1, 0, 2], True), ([0, 1, 3], False), ([-2, 0, 1], False)):
+        layout = replace(LAYOUT, variables=variables)
+        arrays = {"force": np.arange(3.0), "count": 3, "of": values}
+        write_artifact(tmp_path / "a.nc", layout, arrays, Record.begin())
+        assert [fault.key for fault in check_artifact(tmp_path / "a.nc")] == ([] if sound else ["of"])
+
+
+def test_what_a_failed_run_kept_is_marked_and_holds_nan_where_numbers_are_not_finite(tmp_path):
+    arrays = {"force": np.array([1.0, np.inf, np.nan]), "count": 3}
+    write_artifact(tmp_path / "a.partial.nc", LAYOUT, arrays, Record.begin(), partial="energy error 9 %")
+    assert check_artifact(tmp_path / "a.partial.nc") == []
+    kept = read_artifact(tmp_path / "a.partial.nc", "sample", partial=True)
+    assert kept.attrs["partial"] == "energy error 9 %"
+    assert kept.force.values[0] == 1.0
+    assert np.isnan(kept.force.values[1:]).all()
+    with pytest.raises(BadInput, match="2 of 3 values"):
+        read_artifact(tmp_path / "a.partial.nc", "sample")

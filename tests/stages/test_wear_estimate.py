@@ -56,7 +56,7 @@ def filled(layout, **values) -> dict:
     arrays = {}
     for name, v in layout.variables.items():
         shape = tuple(sizes.get(d, 1) for d in v.dims)
-        arrays[name] = np.full(shape, "x") if v.dtype == "U" else np.ones(shape)
+        arrays[name] = np.full(shape, "x") if v.dtype == "U" else np.full(shape, 0 if v.index_of else 1)
     return arrays | values
 
 

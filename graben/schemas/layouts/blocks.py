@@ -39,12 +39,12 @@ LAYOUT = Layout(
     variables={
         "time": Variable(_T, "s", "time since the first state"),
         "vertex_position": Variable(("vertex", "axis"), "m", "position at the first state"),
-        "vertex_block": Variable(_V, "1", "block of the vertex", dtype="i4"),
-        "zone_vertex": Variable(("zone", "zone_corner"), "1", "vertices of the zone", dtype="i4"),
-        "zone_block": Variable(_Z, "1", "block of the zone", dtype="i4"),
+        "vertex_block": Variable(_V, "1", "block of the vertex", dtype="i4", index_of="block"),
+        "zone_vertex": Variable(("zone", "zone_corner"), "1", "vertices of the zone", dtype="i4", index_of="vertex"),
+        "zone_block": Variable(_Z, "1", "block of the zone", dtype="i4", index_of="block"),
         "block_area": Variable(_B, "m2", "area of the block, unstressed"),
-        "block_corner_count": Variable(_B, "1", "corners of the block", dtype="i4"),
-        "block_corner": Variable(("corner",), "1", "vertex of the corner", dtype="i4"),
+        "block_corner_count": Variable(_B, "1", "corners of the block", dtype="i4", sum_of="corner"),
+        "block_corner": Variable(("corner",), "1", "vertex of the corner", dtype="i4", index_of="vertex"),
         "displacement": Variable(("time", "vertex", "axis"), "m", "displacement since the first state"),
         "velocity": Variable(("time", "vertex", "axis"), "m s-1", "velocity"),
         "zone_stress": Variable(("time", "zone", "component"), "Pa", "Cauchy stress, tension positive"),
@@ -77,8 +77,8 @@ LAYOUT = Layout(
             _T, "Pa", "normal stress applied to the lateral sides at the state, where it changes", optional=True
         ),
         "outline": Variable(("wall", "axis"), "m", "corners of the domain before consolidation"),
-        "contact_count": Variable(_T, "1", "contacts of the state", dtype="i4"),
-        "contact_block": Variable(("contact", "pair"), "1", "blocks of the contact", dtype="i4"),
+        "contact_count": Variable(_T, "1", "contacts of the state", dtype="i4", sum_of="contact"),
+        "contact_block": Variable(("contact", "pair"), "1", "blocks of the contact", dtype="i4", index_of="block"),
         "contact_position": Variable(("contact", "axis"), "m", "middle of the contact"),
         "contact_tangent": Variable(("contact", "axis"), "1", "unit vector along the contact"),
         "contact_force": Variable(("contact", "axis"), "N m-1", "force on the first block, per thickness"),
@@ -146,7 +146,9 @@ LAYOUT = Layout(
         "look_load_time": _rising(_L, "s", "time for which pressures had risen, waiting not counted"),
         "look_settlement": _rising(_L, "m", "displacement along the rising pressures, mean over the loaded length"),
         "look_imbalance": _rising(_L, "1", "mean unbalanced force over mean zone force"),
-        "surface_vertex": Variable(("surface",), "1", "vertex of the outline", dtype="i4", optional=True),
+        "surface_vertex": Variable(
+            ("surface",), "1", "vertex of the outline", dtype="i4", optional=True, index_of="vertex"
+        ),
         "surface_carried_displacement": _rising(
             ("surface", "axis"), "m", "displacement of the outline when the last wait began: the last load carried"
         ),

@@ -107,4 +107,5 @@ LAYOUT = Layout(
         ),
         "history": Variable(("generation",), "1", "best objective of the global search"),
     },
+    own_attributes={"law": str, "material": str, "rmse_pa": float},
 )

@@ -48,6 +48,7 @@ LAYOUT = Layout(
             "1",
             "nodes of each element",
             dtype="i4",
+            index_of="node",
             attributes={"cf_role": "face_node_connectivity", "start_index": 0},
         ),
         "time": Variable(("time",), "s", "load time after gravity"),
@@ -62,7 +63,9 @@ LAYOUT = Layout(
         "pressure": Variable(("time", "load"), "Pa", "pressure of each load, pushing positive"),
         "load_name": Variable(("load",), "1", "names of the loads", dtype="U"),
         "reaction": Variable(("time", "axis"), "N m-1", "sum of the support forces on the body"),
-        "surface_node": Variable(("surface",), "1", "node numbers along the free surface", dtype="i4"),
+        "surface_node": Variable(
+            ("surface",), "1", "node numbers along the free surface", dtype="i4", index_of="node"
+        ),
         "surface_distance": Variable(("surface",), "m", "distance along the free surface"),
         "surface_displacement": Variable(
             ("time", "surface", "axis"), "m", "displacement of the free surface since the gravity state"
@@ -75,4 +78,5 @@ LAYOUT = Layout(
         "step_settlement": Variable(("step",), "m", "mean movement of its loaded segment into the body"),
         "step_iterations": Variable(("step",), "1", "factorisations of the step", dtype="i4"),
     },
+    own_attributes={"failed": int, "failure_load_pa": float},
 )

@@ -44,24 +44,36 @@ LAYOUT = Layout(
         "bed_piston_height": Variable(_B, "m", "height of the piston at the end"),
         "bed_unbalanced": Variable(_B, "1", "mean net force over mean contact force at the end"),
         "floor_count": Variable(("bed", "class"), "1", "grains that push on the floor", dtype="i8"),
-        "particle_bed": Variable(_P, "1", "index of the bed", dtype="i8"),
-        "particle_class": Variable(_P, "1", "index of the class", dtype="i8"),
+        "particle_bed": Variable(_P, "1", "index of the bed", dtype="i8", index_of="bed"),
+        "particle_class": Variable(_P, "1", "index of the class", dtype="i8", index_of="class"),
         "particle_radius": Variable(_P, "m", "radius"),
         "position": Variable(("state", "particle", "axis"), "m", "centre"),
         "velocity": Variable(("particle", "axis"), "m s-1", "velocity at the end"),
         "floor_force": Variable(_P, "N", "push on the floor at the end (0: no contact)"),
         "coordination": Variable(_P, "1", "contacts of the sphere at the end, walls included", dtype="i8"),
-        "contact_particle": Variable(("contact", "side"), "1", "indices of the two spheres", dtype="i8"),
+        "contact_particle": Variable(
+            ("contact", "side"), "1", "indices of the two spheres", dtype="i8", index_of="particle"
+        ),
         "contact_normal": Variable(("contact", "axis"), "1", "unit vector from the first to the second sphere"),
         "contact_force": Variable(_C, "N", "normal force, positive: push"),
         "state_name": Variable(("state",), "1", "name of the phase", dtype="U"),
         "state_time": Variable(("bed", "state"), "s", "time at the end of the phase"),
         "bed_periodic": Variable(_B, "1", "1 where the sides repeat", dtype="i1", optional=True),
         "state_contact_count": Variable(
-            ("bed", "state"), "1", "entries of dim force, bed by bed and state by state", dtype="i8", optional=True
+            ("bed", "state"),
+            "1",
+            "entries of dim force, bed by bed and state by state",
+            dtype="i8",
+            optional=True,
+            sum_of="force",
         ),
         "state_contact_particle": Variable(
-            ("force", "side"), "1", "indices of the two spheres (-1: a wall)", dtype="i8", optional=True
+            ("force", "side"),
+            "1",
+            "indices of the two spheres (-1: a wall)",
+            dtype="i8",
+            optional=True,
+            index_of="particle or -1",
         ),
         "state_contact_force": Variable(
             ("force", "axis"), "N", "force on the first sphere, friction included, dashpots not", optional=True
@@ -69,7 +81,7 @@ LAYOUT = Layout(
         "state_contact_arm": Variable(
             ("force", "axis"), "m", "from the centre of the first sphere to the contact", optional=True
         ),
-        "sample_bed": Variable(_S, "1", "index of the bed", dtype="i8"),
+        "sample_bed": Variable(_S, "1", "index of the bed", dtype="i8", index_of="bed"),
         "time": Variable(_S, "s", "time"),
         "kinetic": _energy("kinetic energy of grains and piston"),
         "elastic": _energy("energy in contact springs"),

@@ -52,7 +52,7 @@ LAYOUT = Layout(
         "friction": Variable((), "1", "Coulomb friction"),
         "time": Variable(_TIME, "s", "time"),
         "phase_name": Variable(("phase",), "1", "names of the phases", dtype="U"),
-        "phase_index": Variable(_TIME, "1", "phase", dtype="i4"),
+        "phase_index": Variable(_TIME, "1", "phase", dtype="i4", index_of="phase"),
         "tip_position": Variable(("time", "axis"), "m", "centre of the sphere"),
         "force": Variable(("time", "axis"), "N", "force on the specimen, mean over the interval"),
         "contact_nodes": Variable(_TIME, "1", "surface nodes in contact, half model", dtype="i4"),

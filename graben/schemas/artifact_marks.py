@@ -1,0 +1,65 @@
+"""The marks of an artifact beside its data: global attributes of known types, and a digest of all that it holds."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import xarray
+
+DIGEST = "content_sha256"
+
+_TEXTS = ("title", "software", "software_version", "machine", "scene", "scene_sha256", "inputs", "cost")
+
+
+def content_digest(dataset: xarray.Dataset) -> str:
+    """SHA-256 of attributes and values, the same before writing and after reading."""
+    total = hashlib.sha256()
+    for name, value in sorted(dataset.attrs.items()):
+        if name != DIGEST:
+            total.update(f"{name} {_plain(value)!r}\n".encode())
+    for name in sorted(map(str, dataset.variables)):
+        values = np.asarray(dataset[name].values)
+        total.update(f"{name} {values.shape}\n".encode())
+        if values.dtype.kind in "SUO":
+            total.update("\0".join(map(str, values.ravel())).encode())
+        else:
+            # Text of the kind, not of the byte order; nan has many bit patterns, of which reading keeps one.
+            values = np.where(np.isnan(values), np.nan, values) if values.dtype.kind == "f" else values
+            total.update(np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<")).tobytes())
+    return total.hexdigest()
+
+
+def attribute_faults(attributes: Mapping[str, Any], declared: Mapping[str, type]) -> Iterator[tuple[str, str, str]]:
+    """(name, value, expected) of every global attribute that is missing or cannot be read as what it is.
+
+    declared : those that only artifacts of this kind have, by type
+    """
+    wanted: dict[str, type] = {**dict.fromkeys(_TEXTS, str), "seed": int, **declared}
+    for name, kind in wanted.items():
+        value = _plain(attributes[name]) if name in attributes else None
+        if value is None:
+            yield name, "(absent)", f"an attribute of type {kind.__name__}"
+        elif not isinstance(value, (int, float) if kind is float else kind) or isinstance(value, bool):
+            yield name, repr(value)[:60], f"an attribute of type {kind.__name__}"
+        elif name in ("inputs", "cost"):
+            try:
+                fits = isinstance(json.loads(str(value)), dict)
+            except (ValueError, RecursionError):
+                fits = False
+            if not fits:
+                yield name, repr(value)[:60], "a JSON object"
+    scene, digest = attributes.get("scene"), attributes.get("scene_sha256")
+    texts = isinstance(scene, str) and isinstance(digest, str)
+    if texts and hashlib.sha256(str(scene).encode(errors="replace")).hexdigest() != digest:
+        yield "scene_sha256", str(digest)[:12], "the digest of the attribute scene"
+
+
+def _plain(value: Any) -> Any:
+    """An attribute as Python has it: libraries give numbers as arrays of one."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
