@@ -49,7 +49,8 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
     Returns
     -------
     headline numbers: contacts per area of each class with their 95 % interval (1/m2), the same times diameter
-    squared, solid fraction, energy error
+    squared, solid fraction, energy error, unbalanced force ratio, shares of the weight that floor and side walls
+    carry before pressing
 
     Raises
     ------
@@ -102,6 +103,8 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
         "unbalanced_force_ratio": record.cost["unbalanced_force_ratio"],
         "largest_overlap_over_radius": record.cost["largest_overlap_over_radius"],
         "warnings": record.warnings,
+        "floor_share_of_weight": float(np.mean([b.floor_share_of_weight for b in beds])),
+        "wall_share_of_weight": float(np.mean([b.wall_share_of_weight for b in beds])),
     }
 
 
@@ -260,6 +263,8 @@ def _arrays(scene: ParticlesScene, law: LinearLaw, beds: list[Bed]) -> dict[str,
         "bed_solid_fraction": [b.solid_fraction for b in beds],
         "bed_piston_height": [b.piston_height for b in beds],
         "bed_unbalanced": [b.survey.unbalanced for b in beds],
+        "bed_floor_share_of_weight": [b.floor_share_of_weight for b in beds],
+        "bed_wall_share_of_weight": [b.wall_share_of_weight for b in beds],
         "floor_count": counts,
         "particle_bed": np.repeat(np.arange(len(beds)), np.diff(offset)),
         "particle_class": kind,

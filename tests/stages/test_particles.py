@@ -66,6 +66,8 @@ def test_headline(made):
     headline = json.loads((made / "bed.json").read_text())
     bed = read_artifact(made / "bed.nc", "particles")
     assert [c["name"] for c in headline["classes"]] == ["coarse", "fine"]
+    assert headline["wall_share_of_weight"] == 0.0 == bed["bed_wall_share_of_weight"].values.max()
+    assert abs(headline["floor_share_of_weight"] - 1.0) < 0.02
     assert headline["classes"][1]["contacts_per_m2"] == bed["floor_contacts_per_area"].values[1]
 
 

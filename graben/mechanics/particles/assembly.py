@@ -32,6 +32,7 @@ class Survey:
     overlap: float  # largest overlap over the radius of the smaller body
     floor_push: float
     piston_push: float
+    wall_lift: float  # vertical friction of the side walls on the particles
     step_over_critical: float
 
     @property

@@ -21,9 +21,12 @@ Ints = NDArray[np.int64]
 NOMINAL_FRACTION = 0.6
 # the time step is shortened where it passes this part of the stable one, bounded from the contacts that exist
 STEP_LIMIT = 0.9
+# part of the load by which what floor and walls carry may miss it at rest
+CARRIED = 0.02
 HISTORY = (
     "time", "kinetic", "elastic", "potential", "dashpots", "friction", "drag", "floor_work", "piston_work", "total",
     "unbalanced", "floor_push", "piston_push", "piston_height", "floor_contacts",
+    "wall_lift",
 )  # fmt: skip
 
 
@@ -36,9 +39,9 @@ class BedRecipe:
     loose_fraction : solid fraction of the inserted column
     gravity : m/s2; pressure : Pa on top
     shakes : cycles of the floor, z = amplitude sin(2 pi frequency t), amplitude m, frequency Hz
-    rest : kinetic energy over (weight x smallest radius) at which a bed has settled
-    balance : unbalanced force ratio at which the bed counts as quiet; energy_limit : allowed relative error of
-        the energy balance
+    rest : kinetic energy over (weight x smallest radius) at which a bed is at rest
+    balance : unbalanced force ratio at which the quenched bed is at rest; ten times as much ends the phases before it
+    energy_limit : allowed relative error of the energy balance
     """
 
     share: Floats
@@ -84,6 +87,8 @@ class Bed:
     area: float = 0.0
     piston_height: float = 0.0
     solid_fraction: float = 0.0
+    floor_share_of_weight: float = 0.0  # before pressing; the walls' friction carries the rest
+    wall_share_of_weight: float = 0.0
     energy_error: float = 0.0
     steps: int = 0
     rebuilds: int = 0
@@ -113,6 +118,8 @@ def check_recipe(law: LinearLaw, recipe: BedRecipe) -> None:
         raise Refused(f"expected pressure > 0 and gravity > 0, found {recipe.pressure}, {recipe.gravity}")
     if recipe.shakes > 0 and not (recipe.shake_amplitude > 0.0 and recipe.shake_frequency > 0.0):
         raise Refused("shaking: expected amplitude > 0 and frequency > 0")
+    if not law.rubs and not law.damping > 0.0:
+        raise Refused("contact.damping: expected a positive value where no friction acts; nothing else takes energy")
     numbers(law, recipe)
     largest = 2.0 * float(law.radius.max())
     if not recipe.periodic and min(recipe.width) <= largest:
@@ -198,31 +205,51 @@ class _Run:
             )  # fmt: skip
         known = {**energy, "time": box.time, "unbalanced": min(s.unbalanced, 1e30), "floor_push": s.floor_push,
                  "piston_push": s.piston_push, "piston_height": box.place[motion.PISTON],
-                 "floor_contacts": float(np.count_nonzero(floor_force))}  # fmt: skip
+                 "floor_contacts": float(np.count_nonzero(floor_force)), "wall_lift": s.wall_lift}  # fmt: skip
         self.rows.append([known[name] for name in HISTORY])
         self.last_good = self.snapshot()
         return s
 
     def until(
-        self, phase: str, quiet: Callable[[Survey], bool], share: tuple[float, float], chunk: int = 200
-    ) -> None:
-        """Run in chunks until `quiet`; two samples in a row must agree. share: of the progress of the run."""
+        self, phase: str, missing: Callable[[Survey], str], share: tuple[float, float], chunk: int = 200
+    ) -> Survey:
+        """Run in chunks until nothing is missing, in two samples in a row. share: of the progress of the run."""
         calm = chunks = 0
         while calm < 2:
             self.box.advance(chunk)
             s = self.sample()
-            calm = calm + 1 if quiet(s) else 0
+            lacking = missing(s)
+            calm = 0 if lacking else calm + 1
             chunks += 1
             fraction = share[0] + (share[1] - share[0]) * (1.0 - np.exp(-chunks / 60.0))  # its end is not known
             self.progress(fraction, f"{phase}: unbalanced force {s.unbalanced:.2e}, kinetic {s.kinetic:.2e} J")
-            if self.box.steps > self.recipe.max_steps:
+            if lacking and self.box.steps > self.recipe.max_steps:
                 raise NumericsFailed(
-                    f"{phase} did not come to rest: unbalanced force {s.unbalanced:.2e}", step=self.box.steps,
-                    advice="raise numerics.max_steps or numerics.balance, or the contact damping",
+                    f"{phase} did not come to rest: {lacking}", step=self.box.steps,
+                    advice="raise numerics.max_steps, numerics.rest or numerics.balance, or the contact damping",
                 )  # fmt: skip
         self.states[phase] = self.box.by_identity(self.box.x)
         self.times[phase] = self.box.time
         self.forces[phase] = self.box.contact_forces()
+        return s
+
+    def unrest(self, s: Survey, balance: float) -> str:
+        """What keeps the bed from rest: motion, forces on the grains, or those of floor, walls and piston; or ""."""
+        recipe, weight = self.recipe, self.mass * self.recipe.gravity
+        slow = recipe.rest * weight * float(self.box.law.radius.min())
+        if not s.unbalanced < balance:
+            return f"unbalanced force {s.unbalanced:.3g} of the mean contact force (limit {balance:g})"
+        if not s.kinetic < slow:
+            speed = np.sqrt(np.einsum("ij,ij->i", self.box.v, self.box.v))
+            moving = int(np.count_nonzero(speed**2 > 2.0 * slow / self.mass))
+            return (
+                f"kinetic energy {s.kinetic:.3g} J (limit {slow:.3g} J), {moving} of {len(speed)} grains move, "
+                f"the fastest at {speed.max():.3g} m/s; spheres roll on where the ground is flat"
+            )
+        carried = s.floor_push + s.wall_lift - s.piston_push
+        if not abs(carried - weight) < CARRIED * (weight + s.piston_push):
+            return f"floor and walls carry {carried:.4g} N of a weight of {weight:.4g} N"
+        return ""
 
 
 def make_bed(
@@ -248,14 +275,13 @@ def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
     """All phases after insertion."""
     box = run.box
     small = float(law.radius.min())
-    slow = recipe.rest * recipe.gravity * small  # kinetic energy per mass of a grain at rest
     mean_k = float(np.mean(np.diag(law.pair_kn)))
     weight = run.mass * recipe.gravity
 
-    def resting(s: Survey) -> bool:
-        return s.kinetic < slow * run.mass and abs(s.floor_push - weight) < 0.02 * weight
+    def resting(s: Survey) -> str:
+        return run.unrest(s, 10.0 * recipe.balance)
 
-    run.until("settled", resting, (0.0, 0.5))
+    at_rest = run.until("settled", resting, (0.0, 0.5))
     if recipe.shakes > 0:
         begun, length = box.time, recipe.shakes / recipe.shake_frequency
         box.shake_floor(recipe.shake_amplitude, recipe.shake_frequency)
@@ -265,25 +291,31 @@ def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
             done = (box.time - begun) / length
             run.progress(0.5 + 0.1 * done, f"shaking: {done * recipe.shakes:.0f} cycles")
         box.shake_floor(0.0, 0.0)
-        run.until("shaken", resting, (0.6, 0.7))
+        at_rest = run.until("shaken", resting, (0.6, 0.7))
 
     # the plate is light, so that it follows the bed, and its dashpot is critical on the bed's stiffness
     top = float(np.max(box.x[:, 2] + box.radius))
     push = recipe.pressure * run.area
-    plate_mass = 0.1 * run.mass
-    bed_stiffness = mean_k * run.area / (2.0 * small) / top  # of a plate on a column of springs
+    cell = (2.0 * small) ** 2
+    footing = min(run.area, len(run.insertion_kind) * cell)  # few grains are fewer than a layer
+    layer = footing / cell * float(law.mass.min())
+    plate_mass = max(0.1 * run.mass, 0.3 * layer)  # a lighter one would need a shorter time step
+    bed_stiffness = mean_k * footing / (2.0 * small) / top  # of a plate on a column of springs
     damping = 2.0 * np.sqrt(bed_stiffness * plate_mass)
     pace = np.pi * np.sqrt((run.mass / 3.0 + plate_mass) / bed_stiffness)  # half period of the slowest mode, s
     box.set_piston(top, plate_mass, damping, push, push / (recipe.ramp * pace))
 
-    def pressed(s: Survey) -> bool:
-        on = box.scalars[motion.PISTON_PUSH] >= push
-        return on and abs(s.piston_push - push) < 0.01 * push and s.unbalanced < 10.0 * recipe.balance
+    def pressed(s: Survey) -> str:
+        if box.scalars[motion.PISTON_PUSH] < push or not abs(s.piston_push - push) < 0.01 * push:
+            return f"the piston pushes with {s.piston_push:.4g} N of {push:.4g} N"
+        if not s.unbalanced < 10.0 * recipe.balance:
+            return f"unbalanced force {s.unbalanced:.3g} of the mean contact force (limit {10.0 * recipe.balance:g})"
+        return ""
 
     run.until("pressed", pressed, (0.7, 0.9))
     # quench: drag that damps the slowest mode critically, until forces balance
     box.drive[motion.DRAG_RATE] = 2.0 * np.pi / (2.0 * pace)
-    run.until("quenched", lambda s: s.unbalanced < recipe.balance, (0.9, 1.0))
+    run.until("quenched", lambda s: run.unrest(s, recipe.balance), (0.9, 1.0))
 
     s, floor_force, coordination = box.survey()
     pair, normal, contact_push = box.contacts()
@@ -306,6 +338,8 @@ def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
         area=run.area,
         piston_height=height,
         solid_fraction=run.volume / (run.area * height),
+        floor_share_of_weight=at_rest.floor_push / weight,
+        wall_share_of_weight=at_rest.wall_lift / weight,
         energy_error=run.energy_error,
         steps=box.steps,
         rebuilds=box.rebuilds,

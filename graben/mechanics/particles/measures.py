@@ -52,11 +52,12 @@ def survey(
     Fills floor_force (n,), coordination (n,) with the contacts of each particle (walls included) and stiffness (n,)
     with the largest eigenvalue of the 3 x 3 stiffness that its contacts give it, N/m.
     Returns an array: kinetic, spinning, elastic, potential energy (J), mean contact force, mean net force (N),
-    number of contacts, largest overlap over radius, pushes on floor and piston (N).
+    number of contacts, largest overlap over radius, pushes on floor and piston, and the force with which friction on
+    the side walls lifts the particles (N).
     """
     n = x.shape[0]
     rows = np.zeros((n, 6))
-    kinetic = spinning = elastic = potential = force_sum = net_sum = worst = floor = piston = 0.0
+    kinetic = spinning = elastic = potential = force_sum = net_sum = worst = floor = piston = lift = 0.0
     contacts = 0
     for i in range(n):
         coordination[i] = 0
@@ -81,6 +82,8 @@ def survey(
                 if rubs:
                     s2 = wall_slip[i, w, 0] ** 2 + wall_slip[i, w, 1] ** 2 + wall_slip[i, w, 2] ** 2
                     elastic += 0.5 * s2 / wall_kt[kind[i]]
+                    if w < FLOOR:
+                        lift += wall_slip[i, w, 2]
                 rows[i, a] += k
                 force_sum += k * overlap
                 contacts += 1
@@ -125,11 +128,11 @@ def survey(
                     rows[p, 5] += scale * g2 * g0
     for i in range(n):
         stiffness[i] = largest_eigenvalue(rows[i])
-    out = np.empty(10)
+    out = np.empty(11)
     out[0], out[1], out[2], out[3] = kinetic, spinning, elastic, potential
     out[4] = force_sum / max(contacts, 1)
     out[5] = net_sum / max(n, 1)
-    out[6], out[7], out[8], out[9] = float(contacts), worst, floor, piston
+    out[6], out[7], out[8], out[9], out[10] = float(contacts), worst, floor, piston, lift
     return out
 
 

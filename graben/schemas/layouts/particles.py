@@ -43,6 +43,12 @@ LAYOUT = Layout(
         "bed_solid_fraction": Variable(_B, "1", "solid volume over volume between floor and piston"),
         "bed_piston_height": Variable(_B, "m", "height of the piston at the end"),
         "bed_unbalanced": Variable(_B, "1", "mean net force over mean contact force at the end"),
+        "bed_floor_share_of_weight": Variable(
+            _B, "1", "part of the weight that the floor carries before pressing", optional=True
+        ),
+        "bed_wall_share_of_weight": Variable(
+            _B, "1", "part of the weight that friction on the side walls carries before pressing", optional=True
+        ),
         "floor_count": Variable(("bed", "class"), "1", "grains that push on the floor", dtype="i8"),
         "particle_bed": Variable(_P, "1", "index of the bed", dtype="i8", index_of="bed"),
         "particle_class": Variable(_P, "1", "index of the class", dtype="i8", index_of="class"),
@@ -97,5 +103,6 @@ LAYOUT = Layout(
         "piston_push": Variable(_S, "N", "force on the piston"),
         "piston_height": Variable(_S, "m", "height of the piston (0: not there yet)"),
         "floor_contacts": Variable(_S, "1", "grains that push on the floor"),
+        "wall_lift": Variable(_S, "N", "vertical force of the side walls' friction on the grains", optional=True),
     },
 )

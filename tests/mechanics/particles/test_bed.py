@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from graben.errors import NumericsFailed
-from graben.mechanics.particles.bed import HISTORY, BedRecipe, make_bed, numbers
+from graben.errors import NumericsFailed, Refused
+from graben.mechanics.particles.assembly import Assembly
+from graben.mechanics.particles.bed import HISTORY, BedRecipe, _Run, make_bed, numbers
 from graben.mechanics.particles.law import LinearLaw
 from graben.mechanics.particles.sampling import interval_over_areas, interval_over_beds
 
@@ -88,6 +89,57 @@ def test_impossible_recipes(changes, words):
         make_bed(law(), recipe(**changes), seed=0)
 
 
+def test_a_bed_between_rough_walls_rests_though_its_floor_alone_does_not_carry_the_weight():
+    rough = make_bed(
+        replace(law(), friction=0.5, wall_friction=0.8),
+        recipe(width=(4 * D, 4 * D), depth=8 * D, periodic=False, balance=5e-3, rest=1e-2),
+        seed=2,
+    )
+    assert rough.wall_share_of_weight != 0.0
+    assert rough.floor_share_of_weight + rough.wall_share_of_weight == pytest.approx(1.0, abs=0.021)
+    column = dict(zip(HISTORY, rough.history[-1]))
+    weight = rough.radius.size * law().mass[0] * 9.81
+    load = weight + column["piston_push"]
+    assert column["floor_push"] + column["wall_lift"] == pytest.approx(load, rel=0.021)
+    assert rough.survey.unbalanced < 5e-3
+
+
+def test_a_grain_jammed_between_rough_walls_hangs_on_them():
+    """Statics: four walls push with k times the overlap and lift together with the weight; the floor has nothing."""
+    rough = replace(law(), friction=0.5, wall_friction=0.5, damping=0.9, shear_damping=0.9)
+    width = 0.999 * D
+    box = Assembly(rough, np.array([[width / 2, width / 2, 2 * D]]), np.array([0]), (width, width), periodic=False)
+    box.advance(20_000)
+    state, floor_force, _ = box.survey()
+    weight = rough.mass[0] * 9.81
+    assert state.wall_lift == pytest.approx(weight, rel=1e-6)
+    assert state.floor_push == 0.0 and floor_force.sum() == 0.0
+    sunk = weight / (4.0 * rough.wall_kt[0])
+    assert box.x[0, 2] == pytest.approx(2 * D - sunk, abs=1e-3 * sunk)
+
+
+@pytest.mark.parametrize("walls", [True, False])
+@pytest.mark.parametrize("depth", [0.03 * D, 0.3 * D, D])
+def test_single_grains_and_less_than_a_layer_come_to_rest(walls, depth):
+    made = make_bed(
+        replace(law(), friction=0.4, wall_friction=0.4), recipe(depth=depth, periodic=not walls, rest=1e-2), seed=1
+    )
+    assert made.floor_count(1)[0] > 0
+    assert made.floor_share_of_weight + made.wall_share_of_weight == pytest.approx(1.0, abs=0.021)
+    assert np.abs(made.velocity).max() < 0.05 * np.sqrt(9.81 * D)
+
+
+def test_a_bed_in_the_air_is_not_at_rest():
+    """Grains that have not landed have no contact and little speed: no rest, and the reason is told."""
+    fall = _Run(law(), recipe(), 0, lambda fraction, message: None)
+    state, _, _ = fall.box.survey()
+    assert "unbalanced" in fall.unrest(state, 1.0)
+    hanging = replace(state, mean_contact_force=1.0, mean_net_force=0.0, kinetic=0.0, floor_push=0.0)
+    assert "floor and walls carry 0 N" in fall.unrest(hanging, 1.0)
+    rolling = replace(hanging, kinetic=1.0, floor_push=1.0)
+    assert "grains move" in fall.unrest(rolling, 1.0)
+
+
 def test_a_bed_that_does_not_come_to_rest_says_so():
     with pytest.raises(NumericsFailed, match="did not come to rest"):
         make_bed(law(), recipe(max_steps=1000), seed=0)
@@ -101,6 +153,11 @@ def test_lost_energy_stops_the_run():
 def test_soft_grains_stop_the_run():
     with pytest.raises(NumericsFailed, match="overlap"):
         make_bed(law(pressure=0.05), recipe(pressure=3000.0), seed=0)
+
+
+def test_nothing_that_takes_energy_is_refused():
+    with pytest.raises(Refused, match="damping"):
+        make_bed(replace(law(), damping=0.0), recipe(), seed=0)
 
 
 def test_numbers_follow_volume_shares():
