@@ -231,7 +231,7 @@ def set_option(function: Callable[..., None]) -> Callable[..., None]:
         "overrides",
         multiple=True,
         metavar="KEY=VALUE",
-        help='Replace a key of the scene, e.g. --set seed=3 --set loading.confining="1 MPa" (repeatable).',
+        help="Replace a key of the scene, e.g. --set seed=3 --set fidelity=draft (repeatable).",
     )(function)
 
 

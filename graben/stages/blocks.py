@@ -32,7 +32,7 @@ from graben.stages.estimate import Estimate, refuse_too_large
 from graben.stages.measures import warnings_of
 from graben.stages.record import Progress, Record, silent
 
-# Steps of loading for each fidelity; their measured trade is in docs/dem-run-blocks.md
+# Steps of loading for each fidelity; their measured trade is in docs/manual/dem-run-blocks.md
 FIDELITY = {"draft": 12_500, "standard": 50_000, "reference": 200_000}
 
 # How a loading went that follows a force check.

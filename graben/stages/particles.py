@@ -32,7 +32,7 @@ from graben.stages.estimate import Estimate, refuse_too_large, work
 from graben.stages.measures import Measure, warnings_of
 from graben.stages.record import Progress, Record, silent
 
-# (time step over critical, kinetic energy at rest, unbalanced force ratio): docs/dem-run-particles.md has the trade
+# (time step over critical, kinetic energy at rest, unbalanced force ratio)
 FIDELITY = {"draft": (0.6, 1e-2, 5e-3), "standard": (0.4, 1e-3, 1e-3), "reference": (0.2, 1e-4, 1e-4)}
 
 _GRAIN_BYTES = 4000.0  # states, contacts and their histories

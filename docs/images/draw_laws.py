@@ -1,6 +1,6 @@
 """Draw docs/images/law-*.png, one example per constitutive law. Run by hand after a law changes:
 
-python docs/draw_laws.py
+python docs/images/draw_laws.py
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from graben.mechanics.materials.laws import pack
 from graben.mechanics.materials.point import follow
 
-IMAGES = Path(__file__).parent / "images"
+IMAGES = Path(__file__).parent
 ROCK = {"young_modulus": 10e9, "poisson_ratio": 0.25}
 STEEL = {"young_modulus": 210e9, "poisson_ratio": 0.3}
 DRUCKER = {
