@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault, Refused
-from graben.mechanics.blocks import coverage, polygons
+from graben.mechanics.blocks import coverage
 from graben.mechanics.blocks.compression import rectangle_sides
 from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets
 from graben.mechanics.blocks.mending import mend
 from graben.mechanics.blocks.tessellation import Tessellation, voronoi_blocks, without
 from graben.mechanics.local_frame import local_origin
+from graben.mechanics.rings import refuse_crossing, turning_corners
 from graben.schemas.polygon_file import Polygons, read_polygons
 from graben.schemas.scenes.blocks import BlocksScene
 
@@ -65,7 +66,7 @@ def lay_out(scene: BlocksScene) -> Ground:
     origin = local_origin(body) if len(body) else np.zeros(2)
     local = _counted_from(scene, origin)
     _refuse_crossings(local, origin)
-    outline = polygons.turning_corners(np.array(local.domain.corners))
+    outline = turning_corners(np.array(local.domain.corners))
     limits = [_MENDED * t.edge if limit is None else limit for limit in (t.shortest_edge, t.thinnest)]
     mended: dict[str, Any] = {}
     try:
@@ -121,7 +122,7 @@ def _refuse_crossings(scene: BlocksScene, origin: np.ndarray) -> None:
     faults = []
     for key, polygon in held:
         try:
-            polygons.refuse_crossing(np.array(polygon).reshape(-1, 2), origin)
+            refuse_crossing(np.array(polygon).reshape(-1, 2), origin)
         except Refused as error:
             faults.append(Fault(str(scene.source.path), key, "", str(error)))
     if faults:

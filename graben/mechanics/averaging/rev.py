@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from graben.errors import Refused
 from graben.mechanics.averaging.network import Network
+from graben.mechanics.rings import refuse_crossing
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -78,8 +79,7 @@ class Polygon:
         points = self.points
         if points.ndim != 2 or points.shape[0] < 3 or points.shape[1] != 2 or not np.isfinite(points).all():
             raise Refused("a polygon needs at least three corners, each with two finite coordinates")
-        if abs(polygon_area(points)) <= 0.0 or _crosses_itself(points):
-            raise Refused("a polygon must enclose an area and not cross itself")
+        refuse_crossing(points)
 
     @property
     def points(self) -> Floats:
@@ -103,17 +103,19 @@ class Polygon:
         a, b = position[network.edge[:, 0]], position[network.edge[:, 1]]
         crossed = np.zeros(network.block_count, dtype=bool)
         points = self.points
+        # What is nearer than this lies on a side; far from zero coordinates have fewer digits.
+        near = max(1e-9 * self.radius, 4.0 * np.finfo(float).eps * float(np.abs(position).max()))
         for p, q in zip(points, np.roll(points, -1, axis=0)):
             crossed[network.edge_block[segments_cross(a, b, p, q)]] = True
             # A corner on the joint between two blocks lies in neither.
             for block in blocks_with_point(network, position, p):
                 rim = slice(*network.edge_offset[[block, block + 1]])
-                crossed[block] |= segment_distance(p[None, :], a[rim], b[rim]).min() > 1e-9 * self.radius
+                crossed[block] |= segment_distance(p[None, :], a[rim], b[rim]).min() > near
         # Corners on both sides: also where the polygon's side runs exactly through corners of the block.
         start = position[network.edge[:, 0]]
         ends = np.roll(points, -1, axis=0)
         clear = np.min([segment_distance(start, p[None, :], q[None, :]) for p, q in zip(points, ends)], axis=0)
-        clear = clear > 1e-9 * self.radius
+        clear = clear > near
         within = in_polygon(start, points)
         block = network.edge_block
         count = network.block_count
@@ -181,8 +183,3 @@ def segments_cross(a: Floats, b: Floats, p: Floats, q: Floats) -> Flags:
         return (v[..., 0] - u[..., 0]) * (w[..., 1] - u[..., 1]) - (v[..., 1] - u[..., 1]) * (w[..., 0] - u[..., 0])
 
     return (side(a, b, p) * side(a, b, q) < 0.0) & (side(p, q, a) * side(p, q, b) < 0.0)
-
-
-def _crosses_itself(points: Floats) -> bool:
-    ends = np.roll(points, -1, axis=0)
-    return any(bool(segments_cross(points, ends, p, q).any()) for p, q in zip(points, ends))

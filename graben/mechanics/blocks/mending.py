@@ -29,6 +29,7 @@ from graben.mechanics.blocks.tessellation import (
     from_rings,
     shared_points,
 )
+from graben.mechanics.rings import STRAIGHT, refuse_crossing
 
 # A joint that turns by less has kept its direction [rad].
 _TURNED = np.radians(0.1)
@@ -51,7 +52,7 @@ def mend(
     shapes = [s if polygons.signed_area(s) > 0.0 else s[::-1] for s in given]
     for k, shape in enumerate(shapes):
         try:
-            polygons.refuse_crossing(shape)
+            refuse_crossing(shape)
         except Refused as error:
             raise Refused(f"polygon {k}: {error}") from None
     points, rings = shared_points(shapes)
@@ -144,7 +145,7 @@ def _turning(points: np.ndarray, ring: list[int]) -> list[int]:
     back, ahead = xy - np.roll(xy, 1, axis=0), np.roll(xy, -1, axis=0) - xy
     cross = back[:, 0] * ahead[:, 1] - back[:, 1] * ahead[:, 0]
     size = np.hypot(*back.T) * np.hypot(*ahead.T)
-    kept = [p for p, c, s in zip(ring, cross, size) if abs(c) > polygons.STRAIGHT * s]
+    kept = [p for p, c, s in zip(ring, cross, size) if abs(c) > STRAIGHT * s]
     return kept if len(kept) > 2 else ring
 
 

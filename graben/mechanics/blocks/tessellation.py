@@ -19,6 +19,7 @@ from scipy.spatial import Voronoi, cKDTree
 
 from graben.errors import Refused
 from graben.mechanics.blocks import polygons
+from graben.mechanics.rings import refuse_crossing
 
 # Mean block area over the square of the nominal edge: UDEC's generator made 419 blocks on 100 m2 for 0.5 m.
 AREA_PER_EDGE_SQUARED = 100.0 / 419.0 / 0.25
@@ -128,7 +129,7 @@ def voronoi_blocks(
     outline = np.asarray(outline, dtype=float)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
         raise Refused(f"outline: expected (m, 2) with m >= 3, found shape {outline.shape}")
-    polygons.refuse_crossing(outline)
+    refuse_crossing(outline)
     area = polygons.signed_area(outline)
     if area < 0.0:
         outline, area = outline[::-1].copy(), -area

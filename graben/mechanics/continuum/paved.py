@@ -15,6 +15,7 @@ from graben.errors import Refused
 from graben.mechanics.continuum.mesh2d import QuadMesh
 from graben.mechanics.continuum.one_body import sound
 from graben.mechanics.continuum.sizing import SizeField, distance_to_segment
+from graben.mechanics.rings import refuse_crossing, without_repeats
 
 _RELAXATIONS = 40
 
@@ -31,15 +32,15 @@ def paved_mesh(outline: np.ndarray, size: SizeField) -> QuadMesh:
     ------
     Refused : the outline crosses itself, or the mesh could not follow it
     """
-    outline = np.ascontiguousarray(outline, dtype=np.float64)
+    outline = np.asarray(outline, dtype=np.float64)
     if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
         raise Refused(f"outline must have shape (c, 2) with c >= 3, found {outline.shape}")
-    x, y = outline.T
+    outline = np.ascontiguousarray(without_repeats(outline))
+    refuse_crossing(outline)
+    x, y = (outline - outline.min(axis=0)).T
     area = 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
     if area < 0:
         outline, area = outline[::-1], -area
-    if _crosses_itself(outline) or not area > 0:
-        raise Refused("the outline crosses or touches itself")
     # A triangle of edge 2 h gives quads whose mean edge is close to h.
     coarse = SizeField(2 * size.size, size.segments, 2 * np.asarray(size.near_size), 2 * np.asarray(size.growth))
     border = _border(outline, coarse)
@@ -164,22 +165,3 @@ def _three_quads_each(points: np.ndarray, triangles: np.ndarray) -> QuadMesh:
     quads = [np.stack([triangles[:, i], middle[:, i], centre, middle[:, (i + 2) % 3]], axis=1) for i in range(3)]
     all_points = np.concatenate([points, points[unique].mean(axis=1), points[triangles].mean(axis=1)])
     return QuadMesh(all_points, np.ascontiguousarray(np.concatenate(quads)))
-
-
-def _crosses_itself(outline: np.ndarray) -> bool:
-    n = len(outline)
-    ends = np.roll(outline, -1, axis=0)
-
-    def side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> float:
-        return float((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]))
-
-    for i in range(n):
-        if np.array_equal(outline[i], ends[i]):
-            return True
-        for j in range(i + 1, n):
-            if j == i + 1 or (i == 0 and j == n - 1):
-                continue
-            a, b, c, d = outline[i], ends[i], outline[j], ends[j]
-            if side(a, b, c) * side(a, b, d) <= 0 and side(c, d, a) * side(c, d, b) <= 0:
-                return True
-    return False

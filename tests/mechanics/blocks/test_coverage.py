@@ -3,8 +3,6 @@
 import numpy as np
 import pytest
 
-from graben.errors import Refused
-from graben.mechanics.blocks import polygons
 from graben.mechanics.blocks.coverage import Given, sound
 from graben.mechanics.blocks.mending import mend
 
@@ -122,14 +120,6 @@ def test_without_a_domain_slits_and_inner_voids_are_gaps_and_a_wide_notch_is_the
     assert "(1.5, 1.5)" in check(ring).faults[0].found
     around = np.array([(0.9, 0.9), (2.1, 0.9), (2.1, 2.1), (0.9, 2.1)])
     assert check(ring, openings=[around]).faults == []
-
-
-def test_outlines_are_freed_of_corners_that_do_not_turn_but_not_of_spikes():
-    assert np.array_equal(polygons.turning_corners(BOX), BOX)
-    more = np.array([(0, 0), (2, 0), (5, 0), (5, 0), (5, 3.5), (0, 3.5), (0, 1), (0, 0)], float)
-    assert sorted(map(tuple, polygons.turning_corners(more))) == sorted(map(tuple, BOX))
-    with pytest.raises(Refused, match=r"at \(7"):
-        polygons.refuse_crossing(np.array([(0, 0), (5, 0), (7, 0), (5, 0), (5, 3), (0, 3)], float))
 
 
 def test_mending_says_what_it_moved():

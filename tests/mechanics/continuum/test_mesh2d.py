@@ -84,7 +84,7 @@ def test_bad_domains_are_named():
     hanging = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 1), (0.5, 2), (0, 2)], float)
     with pytest.raises(ValueError, match="corner 4 lies on the side from corner 2 to corner 3"):
         mapped_mesh(hanging, np.array([(0, 1, 2, 3), (3, 4, 5, 6)]), SizeField(0.5))
-    with pytest.raises(ValueError, match="crosses"):
+    with pytest.raises(ValueError, match="cross"):
         paved_mesh(np.array([(0, 0), (1, 1), (1, 0), (0, 1)], float), SizeField(0.2))
     with pytest.raises(ValueError, match="positive"):
         SizeField(-1.0)
