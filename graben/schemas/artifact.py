@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from graben.errors import BadInput, Fault, NotFinite
-from graben.schemas.artifact_marks import DIGEST, attribute_faults, content_digest
+from graben.schemas.artifact_marks import DIGEST, attribute_faults, content_digest, seal, seal_broken
 from graben.schemas.files import whole_file
 from graben.schemas.provenance import Record
 
@@ -130,6 +130,7 @@ def write_artifact(
             dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
         except RuntimeError as error:
             raise OSError(f"{error}") from error  # what the library makes of a full disk
+        seal(temporary)
 
 
 def _refuse_non_finite(kind: str, name: str, declared: Variable, array: np.ndarray) -> None:
@@ -171,6 +172,8 @@ def kind_of(path: Path) -> str:
     import xarray
 
     try:
+        if seal_broken(path):
+            return ""
         with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as data:
             return str(data.attrs.get("schema_kind", ""))
     except Exception:
@@ -185,6 +188,8 @@ def _read(path: Path, accepted: list[str], partial: bool) -> tuple[list[Fault], 
     if not path.is_file():
         return [Fault(file, "", "", "an existing artifact file")], None
     try:
+        if seal_broken(path):
+            return [Fault(file, "", "", "the bytes that were written; they are damaged")], None
         with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as dataset:
             faults = _faults(file, path.stat().st_size, dataset, accepted, partial)
             return faults, None if faults else dataset.load()

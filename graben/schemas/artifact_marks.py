@@ -1,10 +1,15 @@
-"""The marks of an artifact beside its data: global attributes of known types, and a digest of all that it holds."""
+"""The marks of an artifact beside its data: global attributes of known types, a digest of all that it holds, a seal.
+
+The seal is the digest of the file's bytes, put after their end, where HDF5 does not look. Without it damaged bytes
+would get into the HDF5 library, which some of them crash.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +19,37 @@ if TYPE_CHECKING:
 
 DIGEST = "content_sha256"
 
+_SEAL = b"graben sha256 seal\n"
+_LENGTH = len(_SEAL) + hashlib.sha256().digest_size
+
 _TEXTS = ("title", "software", "software_version", "machine", "scene", "scene_sha256", "inputs", "cost")
+
+
+def seal(path: Path) -> None:
+    """Put the seal at the end of a file that is written."""
+    digest = hashlib.sha256()
+    with open(path, "rb+") as stream:
+        while part := stream.read(1 << 20):
+            digest.update(part)
+        stream.write(_SEAL + digest.digest())
+
+
+def seal_broken(path: Path) -> bool:
+    """Whether a file has a seal that is not that of its bytes; files of other programs have none."""
+    left = path.stat().st_size - _LENGTH
+    if left < 0:
+        return False
+    digest = hashlib.sha256()
+    with open(path, "rb") as stream:
+        stream.seek(left)
+        end = stream.read(_LENGTH)
+        if not end.startswith(_SEAL):
+            return False
+        stream.seek(0)
+        while left > 0 and (part := stream.read(min(left, 1 << 20))):
+            digest.update(part)
+            left -= len(part)
+    return digest.digest() != end[len(_SEAL) :]
 
 
 def content_digest(dataset: xarray.Dataset) -> str:

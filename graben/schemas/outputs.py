@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from graben.errors import BadInput, Fault
+from graben.schemas.artifact_marks import seal_broken
 from graben.schemas.files import existing_folder, machine, part_of, recover
 
 # What is beside an artifact NAME.nc, by the end of its name.
@@ -206,6 +207,8 @@ def _artifact(path: Path, main: Path) -> bool:
     with open(path, "rb") as stream:
         if stream.read(4) != b"\x89HDF":
             return False
+    if seal_broken(path):
+        return True
     with netCDF4.Dataset(path) as data:
         return getattr(data, "software", "") == "graben" or "schema_kind" in data.ncattrs()
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from graben.errors import BadInput, Fault, Incomplete
-from graben.schemas.artifact import check_artifact
+from graben.schemas.artifact import PARTIAL, check_artifact
 from graben.schemas.kinds import SCENES
 from graben.schemas.scene import load_scene
 
@@ -62,8 +62,9 @@ def _artifact(path: Path) -> list[Fault]:
         from xarray import open_dataset
 
         with open_dataset(path, engine="netcdf4", decode_times=False) as data:
-            kind = data.attrs["schema_kind"]
-        _READERS.get(kind, lambda path: None)(path)
+            kind, stopped = data.attrs["schema_kind"], PARTIAL in data.attrs
+        if not stopped:
+            _READERS.get(kind, lambda path: None)(path)
     return faults
 
 

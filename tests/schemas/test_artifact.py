@@ -165,10 +165,21 @@ def test_files_cut_off_or_with_flipped_bytes_are_refused_or_read_as_written(tmp_
         for _ in range(dice.choice((1, 1, 4))):
             damaged[dice.randrange(len(whole))] ^= 1 << dice.randrange(8)
         path.write_bytes(damaged)
-        if not check_artifact(path):
+        if not check_artifact(path):  # the mark of the seal itself
             data = read_artifact(path, "sample")
             assert data.force.values.tolist() == [0.0, 1.0, 2.0]
             assert int(data["count"]) == 3
+
+
+def test_damaged_bytes_are_found_before_any_library_reads_them(tmp_path, monkeypatch):
+    import xarray
+
+    path = write(tmp_path / "a.nc")
+    whole = path.read_bytes()
+    monkeypatch.setattr(xarray, "open_dataset", lambda *_, **__: pytest.fail("read"))
+    for at in (9, 100, len(whole) // 2, len(whole) - 60):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 64]) + whole[at + 1 :])
+        assert "damaged" in check_artifact(path)[0].expected
 
 
 def test_sizes_that_no_file_of_that_length_holds_are_refused(tmp_path):
