@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from graben.schemas.files import whole_file
+
 
 def plain(value: Any) -> Any:
     """The same value of what JSON knows, at any depth; None for nan and infinity."""
@@ -25,3 +27,9 @@ def plain(value: Any) -> Any:
 def to_json(value: Any, **options: Any) -> str:
     """JSON text of `plain(value)`, which holds no NaN."""
     return json.dumps(plain(value), allow_nan=False, **options)
+
+
+def write_json(path: Path, value: Any, **options: Any) -> None:
+    """Write `to_json(value)` as a whole file or not at all."""
+    with whole_file(path) as temporary:
+        temporary.write_text(to_json(value, **options) + "\n", encoding="utf-8")

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ import numpy as np
 from graben.errors import NumericsFailed
 from graben.mechanics.materials.laws import LAWS
 from graben.schemas.artifact import read_artifact
+from graben.schemas.plain import write_json
 from graben.schemas.scenes.material import read_material, write_material
 from graben.stages import fem_run
 
@@ -99,9 +99,7 @@ def main() -> None:
         "softening_width_m": a.widths,
         "width_failure_load_pa": by_width,
     }
-    part = a.output.with_name(f".{a.output.name}.part")
-    part.write_text(json.dumps(result) + "\n", encoding="utf-8")
-    os.replace(part, a.output)
+    write_json(a.output, result)
 
 
 if __name__ == "__main__":

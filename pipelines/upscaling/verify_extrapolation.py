@@ -11,7 +11,6 @@ Writes RESULTS/extrapolation.json.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -19,6 +18,8 @@ from typing import Any
 
 import numpy as np
 from verify_udec import CONFINING_PA, HERE, fingerprint, one_curve
+
+from graben.schemas.plain import write_json
 
 UNSEEN_PA = (3e6, 6e6, 8e6, 10e6)
 QUICK = ['search="dds"', "swarm.starts=2", "increments=1"]
@@ -135,9 +136,7 @@ def main() -> None:
         for job in jobs:
             job.result()
     result = judge(files, a.results)
-    part = a.results / ".extrapolation.json.part"
-    part.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    os.replace(part, a.results / "extrapolation.json")
+    write_json(a.results / "extrapolation.json", result, indent=1)
     if a.picture:
         picture(files, a.results, a.picture)
 

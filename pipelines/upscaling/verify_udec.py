@@ -19,6 +19,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
+from graben.schemas.plain import write_json
+
 os.environ.setdefault("NUMBA_NUM_THREADS", "1")
 HERE = Path(__file__).resolve().parent
 CONFINING_PA = (0.5e6, 1e6, 2e6, 4e6)
@@ -55,7 +57,7 @@ def one_curve(scene: Path, seed: int, confining: float, fidelity: str, output: P
     blocks.unlink()
     measures = {k: v for k, v in headline.items() if isinstance(v, float | int)}
     measures["cpu_s"] = time.process_time() - began
-    output.with_suffix(".json").write_text(json.dumps(measures) + "\n", encoding="utf-8")
+    write_json(output.with_suffix(".json"), measures)
     return measures
 
 
@@ -252,9 +254,7 @@ def main() -> None:
     result["fidelity"], result["curves"] = a.fidelity, str(folder)
     result["cpu_s"] = sum(m["cpu_s"] for m in own)
     result["largest_energy_error"] = max(m["energy_error"] for m in own)
-    part = a.results / ".udec.json.part"
-    part.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    os.replace(part, a.results / "udec.json")
+    write_json(a.results / "udec.json", result, indent=1)
     picture(drawn, a.picture or a.results / "udec-band.png")
     show(result)
 
