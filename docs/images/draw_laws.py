@@ -110,6 +110,15 @@ def main() -> None:
     lines = [(1e3 * cycle, 1e-6 * compress("lubliner", QUASI_BRITTLE, cycle), "tension, compression, unloading")]
     picture("lubliner", lines, "axial strain, 1e-3", "axial stress, MPa")
 
+    crushed = {**QUASI_BRITTLE, "young_modulus": 30e9, "compressive_damage": 0.9, "largest_inelastic_strain": 0.003}
+    axial = np.linspace(0, -0.005, 501)
+    curves = {form: compress("lubliner", {**crushed, "crack_strain": form}, axial) for form in ("current", "printed")}
+    lines = [
+        (-100 * (axial - s / crushed["young_modulus"]), -1e-6 * s, f"crack_strain = {form}")
+        for form, s in curves.items()
+    ]
+    picture("lubliner-crack-strain", lines, "e - s/E, %", stress)
+
     small = np.linspace(0, 4e-3, 400)
     relaxed = {**STEEL, "damage_threshold": 0.5e6, "hardening": [[0.0, 380e6], [1.0, 762e6]]}
     lines = [

@@ -40,6 +40,7 @@ from graben.mechanics.materials.elastic import POISSON, YOUNG, finite, moduli
 from graben.mechanics.materials.hardening import BARCELONA, barcelona_coefficients, harden
 from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law, Parameter
 from graben.mechanics.materials.lubliner_curves import (
+    CRACK_STRAIN,
     compression_rate,
     cracking_strain,
     inelastic_strain,
@@ -55,8 +56,8 @@ from graben.mechanics.materials.principal import (
     split_space,
 )
 
-_E, _NU, _PSI, _ECC, _KC, _F0, _S0, _PEAK, _EPEAK, _DC, _T0, _DECAY, _DT, _WT, _WC, _XC, _XT, _DMAX = range(18)
-_A, _GAMMA, _ALPHA, _BETA, _M, _N, _TAN = range(18, 25)
+_E, _NU, _PSI, _ECC, _KC, _F0, _S0, _PEAK, _EPEAK, _DC, _T0, _DECAY, _DT, _WT, _WC, _XC, _XT, _DMAX, _FORM = range(19)
+_A, _GAMMA, _ALPHA, _BETA, _M, _N, _TAN = range(19, 26)
 
 
 @kernel(error_model="numpy")
@@ -74,15 +75,17 @@ def prepare_lubliner(par):
     par[_PSI] = min(par[_PSI], steepest_dilation(par[_KC], par[_F0]))
     par[_PEAK] = max(par[_PEAK], par[_S0])
     par[_ALPHA], par[_BETA] = barcelona_coefficients(par[_S0], par[_PEAK], par[_EPEAK])
-    par[_M] = compression_rate(par[_DC], par[_E], par[_S0], par[_XC])
-    par[_N] = tension_rate(par[_DT], par[_E], par[_T0], par[_XT])
+    par[_M] = compression_rate(
+        par[_FORM], par[_DC], par[_E], par[_S0], par[_ALPHA], par[_BETA], par[_EPEAK], par[_XC]
+    )
+    par[_N] = tension_rate(par[_FORM], par[_DT], par[_E], par[_T0], par[_DECAY], par[_XT])
     par[_TAN] = math.tan(par[_PSI])
 
 
 @kernel(error_model="numpy")
 def _compression(plastic, par):
     """Effective yield stress and damage in compression at an equivalent plastic strain."""
-    x = inelastic_strain(plastic, par[_M], par[_S0] / par[_E], par[_XC])
+    x = inelastic_strain(par[_FORM], plastic, par[_M], par[_E], par[_S0], par[_ALPHA], par[_BETA], par[_XC])
     nominal, _slope = harden(BARCELONA, x, par[_S0], par[_ALPHA], par[_BETA], par, 0)
     damage = min(par[_M] * x, par[_DMAX])
     return nominal / (1.0 - damage), damage
@@ -91,7 +94,7 @@ def _compression(plastic, par):
 @kernel(error_model="numpy")
 def _tension(plastic, par):
     """Effective yield stress and damage in tension at an equivalent plastic strain."""
-    x = cracking_strain(plastic, par[_N], par[_T0] / par[_E], par[_XT])
+    x = cracking_strain(par[_FORM], plastic, par[_N], par[_E], par[_T0], par[_DECAY], par[_XT])
     damage = min(1.0 - math.pow(1.0 + x, -par[_N]), par[_DMAX])
     return par[_T0] * math.exp(-par[_DECAY] * x) / (1.0 - damage), damage
 
@@ -304,6 +307,10 @@ LUBLINER = Law(
         Parameter("largest_inelastic_strain", "1", 1e-6, 10.0, 0.1, "compressive strains up to here are met"),
         Parameter("largest_cracking_strain", "1", 1e-6, 10.0, 0.1, "cracking strains up to here are met"),
         Parameter("max_damage", "1", 0.0, 0.999999, 0.99, "damage stops here, so that a stiffness remains"),
+        Parameter(
+            "crack_strain", "1", default="current", choices=CRACK_STRAIN,
+            description="stress by which crack strain becomes plastic strain: of the moment, or the first yield (Y)",
+        ),
     ),
     derived=("a", "gamma", "alpha", "beta", "m", "n", "tan_dilation"),
     state_names=(

@@ -97,6 +97,7 @@ UNITS: dict[str, dict[str, str]] = {
         "largest_inelastic_strain": "1",
         "largest_cracking_strain": "1",
         "max_damage": "1",
+        "crack_strain": "word",
     },
     "erve": {
         **_ELASTIC,

@@ -11,10 +11,13 @@ from scipy.special import lambertw
 from graben.mechanics.materials.laws import LAWS, pack, update
 from graben.mechanics.materials.lubliner import steepest_dilation
 from graben.mechanics.materials.lubliner_curves import (
+    CURRENT,
+    PRINTED,
     compression_rate,
     cracking_strain,
     inelastic_strain,
     lambert_w,
+    plastic_tension,
     tension_rate,
 )
 from graben.mechanics.materials.point import follow
@@ -40,63 +43,110 @@ PAR = pack("lubliner", ROCK)
 LINE = Curve("line", np.zeros((2, 4)), np.array([[0.0, 0.0, 0.0, 0.0], [0.0, -1e-4, 0.0, 0.0]]))
 
 
-def uniaxial(strains):
+def uniaxial(strains, par=PAR):
     """Axial strain prescribed, lateral stresses zero."""
     path = np.zeros((len(strains), 4))
     path[:, 1] = strains
-    r = follow("lubliner", PAR, "sese", path)
+    r = follow("lubliner", par, "sese", path)
     assert r.complete.all()
     return r
 
 
+ALPHA = (2 * 30 - 10 + 2 * math.sqrt(30 * 20)) / 10
+BETA = math.log(2 * ALPHA / (1 + ALPHA)) / 0.002
+SQUEEZE, PULL = (20e9, 10e6, ALPHA, BETA), (20e9, 3e6, 2000.0)  # E and the curves of ROCK
+
+
+def barcelona(x):
+    return 10e6 * ((1 + ALPHA) * np.exp(-BETA * x) - ALPHA * np.exp(-2 * BETA * x))
+
+
 def test_lambert_w_matches_scipy():
-    x = np.geomspace(1e-8, 1e8, 50)
-    np.testing.assert_allclose([lambert_w(v) for v in x], lambertw(x).real, rtol=1e-13)
+    x = np.concatenate([np.geomspace(1e-8, 1e8, 50), -np.geomspace(1e-8, 0.367, 30), [0.0]])
+    np.testing.assert_allclose([lambert_w(v) for v in x], lambertw(x).real, rtol=1e-12)
 
 
-def test_damage_rates_lie_at_their_limits_and_conversions_invert():
-    """At d = 1 plastic strain stops growing with damage somewhere in the range, Y (2.83)-(2.84); not below."""
+@pytest.mark.parametrize("form", [CURRENT, PRINTED])
+def test_damage_rates_lie_at_their_limits_and_conversions_invert(form):
+    """At d = 1 plastic strain stops growing with damage somewhere in the range, Y (2.83)-(2.84); not below. e_pl =
+    x - D/(1 - D) s/E with the stress of the moment, or with the first yield as Y prints."""
     for d, steady in ((0.9, True), (1.1, False)):
-        m, n = compression_rate(d, 20e9, 10e6, 0.02), tension_rate(d, 20e9, 3e6, 0.01)
+        m = compression_rate(form, d, *SQUEEZE, 0.002, 0.02)
+        n = tension_rate(form, d, *PULL, 0.01)
         x = np.linspace(0, 0.02, 4001)
-        plastic = x - m * x / (1 - m * x) * 10e6 / 20e9
+        s = barcelona(x) if form == CURRENT else 10e6
+        plastic = x - m * x / (1 - m * x) * s / 20e9
         assert (np.diff(plastic) > 0).all() == steady
         y = np.linspace(0, 0.01, 4001)
-        cracks = y - ((1 + y) ** n - 1) * 3e6 / 20e9
+        s = 3e6 * np.exp(-2000 * y) if form == CURRENT else 3e6
+        cracks = y - ((1 + y) ** n - 1) * s / 20e9
         assert (np.diff(cracks) > 0).all() == steady
         if steady:
-            np.testing.assert_allclose(
-                [inelastic_strain(p, m, 5e-4, 0.02) for p in plastic[::400]], x[::400], atol=1e-14
-            )
-            np.testing.assert_allclose(
-                [cracking_strain(p, n, 1.5e-4, 0.01) for p in cracks[::400]], y[::400], atol=1e-14
-            )
+            found = [inelastic_strain(form, p, m, *SQUEEZE, 0.02) for p in plastic[::400]]
+            np.testing.assert_allclose(found, x[::400], atol=1e-13)
+            found = [cracking_strain(form, p, n, *PULL, 0.01) for p in cracks[::400]]
+            np.testing.assert_allclose(found, y[::400], atol=1e-13)
 
 
-def test_uniaxial_compression_follows_the_barcelona_curve():
+@pytest.mark.parametrize("decay", [0.0, 300.0, 2000.0, 1e5, 1e9])
+@pytest.mark.parametrize("young", [1e9, 20e9, 1e15])
+def test_the_limit_in_tension_is_where_plastic_strain_stops(decay, young):
+    """Also where stress falls faster than E: a conversion at 0.99 of the limit never turns back."""
+    n = tension_rate(CURRENT, 0.99, young, 3e6, decay, 0.01)
+    x = np.concatenate([np.linspace(0, 0.01, 1001), np.geomspace(1e-12, 0.01, 1001)])
+    x.sort()
+    cracks = np.array([plastic_tension(CURRENT, v, n, young, 3e6, decay) for v in x])
+    assert n > 0 and np.isfinite(cracks).all() and (np.diff(cracks) >= -1e-15).all()
+
+
+def test_printed_limits_are_those_of_the_source():
+    """Y (2.86) at the largest strain, (2.90) by Lambert's W: with the first yield as stress."""
+    young, first, x = 20e9, 10e6, 0.02
+    product = 2 * young * x
+    m = (first + product - math.sqrt(first * (first + 2 * product))) / (product * x)
+    assert compression_rate(PRINTED, 1.0, *SQUEEZE, 0.002, x) == pytest.approx(m, rel=1e-12)
+    y = np.linspace(0, 0.01, 65)[1:]
+    n = (lambertw(young / 3e6 * (1 + y) * np.log1p(y)).real / np.log1p(y)).min()
+    assert tension_rate(PRINTED, 1.0, *PULL, 0.01) == pytest.approx(n, rel=1e-12)
+
+
+def test_uniaxial_compression_follows_the_barcelona_curve_over_crack_strain():
+    """x = e - s/E, from strain and stress themselves: Y's own definition, which its (2.81) breaks."""
     r = uniaxial(-np.linspace(0, 0.006, 121))
-    alpha = (2 * 30 - 10 + 2 * math.sqrt(30 * 20)) / 10
-    beta = math.log(2 * alpha / (1 + alpha)) / 0.002
-    m = compression_rate(0.6, 20e9, 10e6, 0.02)
-    for stress, state in zip(r.stress[0], r.state[0]):
-        if state[2] < 1e-9:
-            continue
-        x = inelastic_strain(state[2], m, 5e-4, 0.02)
-        curve = 10e6 * ((1 + alpha) * math.exp(-beta * x) - alpha * math.exp(-2 * beta * x))
-        assert -stress[1] == pytest.approx(curve, rel=1e-8)
-        assert state[4] == pytest.approx(m * x, rel=1e-9) and state[3] < 1e-12
-    assert -r.stress[0, :, 1].min() == pytest.approx(30e6, rel=1e-3)
+    stress, strain, state = -r.stress[0, :, 1], -r.strain[0, :, 1], r.state[0]
+    flowing = state[:, 2] > 1e-9
+    x = (strain - stress / 20e9)[flowing]
+    m = compression_rate(CURRENT, 0.6, *SQUEEZE, 0.002, 0.02)
+    assert flowing.sum() > 100
+    np.testing.assert_allclose(stress[flowing], barcelona(x), rtol=1e-7)
+    np.testing.assert_allclose(state[flowing, 4], m * x, rtol=1e-8)
+    np.testing.assert_allclose(state[flowing, 2], x - m * x / (1 - m * x) * barcelona(x) / 20e9, rtol=1e-7)
+    assert (state[:, 3] < 1e-12).all() and stress.max() == pytest.approx(30e6, rel=1e-3)
 
 
-def test_uniaxial_tension_follows_its_decay():
+def test_uniaxial_tension_follows_its_decay_over_crack_strain():
     r = uniaxial(np.linspace(0, 0.002, 81))
-    n = tension_rate(0.6, 20e9, 3e6, 0.01)
-    for stress, state in zip(r.stress[0], r.state[0]):
-        if state[3] < 1e-9:
-            continue
-        x = cracking_strain(state[3], n, 1.5e-4, 0.01)
-        assert stress[1] == pytest.approx(3e6 * math.exp(-2000 * x), rel=1e-7)
-        assert state[5] == pytest.approx(1 - (1 + x) ** -n, rel=1e-7) and state[2] < 1e-12
+    stress, strain, state = r.stress[0, :, 1], r.strain[0, :, 1], r.state[0]
+    flowing = state[:, 3] > 1e-9
+    x = (strain - stress / 20e9)[flowing]
+    n = tension_rate(CURRENT, 0.6, *PULL, 0.01)
+    assert flowing.sum() > 60
+    np.testing.assert_allclose(stress[flowing], 3e6 * np.exp(-2000 * x), rtol=1e-6)
+    np.testing.assert_allclose(state[flowing, 5], 1 - (1 + x) ** -n, rtol=1e-6)
+    assert (state[:, 2] < 1e-12).all()
+
+
+def test_the_printed_conversion_shifts_the_curve_from_its_own_definition():
+    """At the peak the shift is D/(1 - D) (s - s0)/E."""
+    r = uniaxial(-np.linspace(0, 0.006, 601), pack("lubliner", {**ROCK, "crack_strain": "printed"}))
+    stress, strain, state = -r.stress[0, :, 1], -r.strain[0, :, 1], r.state[0]
+    m = compression_rate(PRINTED, 0.6, *SQUEEZE, 0.002, 0.02)
+    for k in (150, 250, 400):
+        x = inelastic_strain(PRINTED, state[k, 2], m, *SQUEEZE, 0.02)
+        damage = state[k, 4]
+        assert stress[k] == pytest.approx(barcelona(x), rel=1e-8)
+        shift = strain[k] - stress[k] / 20e9 - x
+        assert shift == pytest.approx(damage / (1 - damage) * (stress[k] - 10e6) / 20e9, rel=1e-6)
 
 
 def test_biaxial_compression_yields_at_f0_times_the_uniaxial_stress():
