@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from graben.mechanics.particles.assembly import Assembly
 from graben.mechanics.particles.bed import Bed, BedRecipe, make_bed
+from graben.mechanics.particles.insertion import insert
 from graben.mechanics.particles.law import LinearLaw
+from graben.mechanics.particles.motion import FLOOR
 from graben.mechanics.wear.counts import contacts_per_area
 
 D = 1e-4
@@ -55,3 +58,46 @@ def test_two_sizes_follow_the_house_law():
     mean, error = density(beds(6, 20.0, sizes, (0.5, 0.5), overlap=0.002, depth=12.0), sizes)
     law = contacts_per_area("graben", np.array(sizes) * D, np.array([0.5, 0.5])) * (np.array(sizes) * D) ** 2
     np.testing.assert_allclose(mean, law, atol=0.03 + 2.0 * float(error.max()))
+
+
+@pytest.mark.verify
+def test_a_tall_silo_follows_janssen():
+    """Floor share (1 - exp(-a)) / a, a = 4 mu K h / W, with K and the mobilised friction mu measured.
+
+    Poured grains hardly mobilise the walls' friction; a floor that sinks by a third of a grain does.
+    """
+    width, mu = 5 * D, 0.3
+    count = int(0.6 * width**2 * 30 * D / (np.pi / 6 * D**3))
+    stiffness = np.array([2 * 30.0 * D / 0.005])
+    law = LinearLaw(
+        np.array([D / 2]), np.array([2200.0]), stiffness, 10.0 * float(stiffness[0]), friction=0.5, wall_friction=mu,
+        damping=0.5, shear_damping=0.5,
+    )  # fmt: skip
+    column = count * np.pi / 6 * D**3 / (0.25 * width**2)
+    x = insert(np.full(count, D / 2), (width, width), column, np.random.Generator(np.random.PCG64(0)), periodic=False)
+    box = Assembly(law, x, np.zeros(count, int), (width, width), periodic=False, safety=0.6)
+    weight = count * law.mass[0] * 9.81
+
+    def shares() -> tuple[float, float, float]:
+        """Floor's share of the weight, Janssen's, and the mobilised part of the walls' friction."""
+        state, side = box.survey()[0], box.wall_force[:4].sum()
+        height = 2.0 * float((box.x[:, 2] - box.place[FLOOR]).mean())
+        forces, place = box.contact_forces(), box.by_identity(box.x)
+        first, second = forces.pair.T
+        branch = np.where(second[:, None] >= 0, place[second] - place[first], forces.arm)
+        vertical = -float((forces.force[:, 2] * branch[:, 2]).sum()) / (width**2 * height)
+        a = state.wall_lift / (width**2 * vertical)  # lift = mu side, side = K vertical 4 W h
+        return state.floor_push / weight, (1.0 - np.exp(-a)) / a, state.wall_lift / (mu * side)
+
+    box.advance(40_000)
+    found, janssen, mobilised = shares()
+    assert found == pytest.approx(janssen, rel=0.03) and mobilised < 0.2
+    box.speed[FLOOR] = -1e-3
+    box.advance(25_000)
+    rows = []
+    for _ in range(3):
+        box.advance(5_000)
+        rows.append(shares())
+    found, janssen, mobilised = np.mean(rows, axis=0)
+    assert found == pytest.approx(janssen, rel=0.1)
+    assert found < 0.25 and mobilised > 0.5
