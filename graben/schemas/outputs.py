@@ -51,7 +51,7 @@ class Outputs:
 
     main: Path
     ends: tuple[str, ...] = ()
-    kept: tuple[str, ...] = ()
+    kept: tuple[str, ...] = (PARTIAL,)
     others: tuple[Path, ...] = ()
     _kept: frozenset[Path] = field(init=False, default=frozenset())
 

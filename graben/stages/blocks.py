@@ -29,6 +29,7 @@ from graben.stages.blocks_output import write_vtk
 from graben.stages.blocks_programme import Rising
 from graben.stages.blocks_sizes import sizes_of
 from graben.stages.estimate import Estimate, refuse_too_large
+from graben.stages.last_good import keep_by, keeps_last_good, write_whole
 from graben.stages.measures import warnings_of
 from graben.stages.record import Progress, Record, silent
 
@@ -45,6 +46,7 @@ def outputs_of(scene: BlocksScene, output: Path) -> Outputs:
     return Outputs(output, series, kept=(CHECKPOINT, PARTIAL))
 
 
+@keeps_last_good("no state had been saved yet; the first one is saved when the blocks have come to rest")
 def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Progress = silent) -> dict[str, Any]:
     """Run a scene of blocks, write the artifact and its VTU files.
 
@@ -69,7 +71,17 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
     history = History(model, scene.output.balance)
     if parts is not None:
         _bring_back(blocks_checkpoint.path_for(output), model, test, history, parts)
-    keeper = blocks_checkpoint.Keeper(output, scene)
+    keeper = blocks_checkpoint.Keeper(output, scene, len(history.time))
+
+    def keep(why: str) -> Path | None:
+        if not keeper.states:
+            return None
+        history.cut(keeper.states)
+        path = beside(output, PARTIAL)
+        write_artifact(path, LAYOUT, ground.placed(_arrays(model, history, test)), record, partial=why)
+        return path
+
+    keep_by(keep)
 
     def save() -> None:
         history.save()
@@ -78,11 +90,8 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
 
     try:
         test.go_on(history, save, progress)
-    except (NumericsFailed, KeyboardInterrupt) as stop:
+    except (NumericsFailed, KeyboardInterrupt):
         keeper.stopped()
-        if history.time and isinstance(stop, NumericsFailed):
-            arrays = ground.placed(_arrays(model, history, test))
-            write_artifact(beside(output, PARTIAL), LAYOUT, arrays, record)
         raise
     arrays = _arrays(model, history, test)
     headline = test.headline(arrays) | ground.mended
@@ -108,7 +117,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         with together():
             if scene.output.vtk:
                 write_vtk(output, arrays)
-            write_artifact(output, LAYOUT, arrays, record)
+            write_whole(output, LAYOUT, arrays, record)
     except (MachineFailed, KeyboardInterrupt):
         keeper.stopped()
         raise

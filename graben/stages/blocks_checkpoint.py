@@ -34,6 +34,7 @@ class Keeper:
 
     output: Path
     scene: Scene
+    states: int = 0  # saved ones that passed every check
     _last: Arrays = field(default_factory=dict)
     _history: History | None = None
     _written: float = field(default_factory=time.monotonic)
@@ -42,7 +43,8 @@ class Keeper:
         """Remember the state that was just saved; test : what the loading needs to go on."""
         self._last = {f"model.{k}": v for k, v in snapshot.take(model).items()}
         self._last |= {f"test.{k}": np.array(v) for k, v in test.items()}
-        self._last["states"] = np.array(len(history.time))
+        self.states = len(history.time)
+        self._last["states"] = np.array(self.states)
         self._history = history
         if time.monotonic() - self._written > EVERY_S:
             self.write()

@@ -171,7 +171,7 @@ class Rising:
         surface = self._surface()
         return {
             "confining_stress": np.array(0.0),
-            "load_time": np.array(self.load_times),
+            "load_time": np.array(self.load_times[: len(history.time)]),
             "look_load_time": looks[:, 0],
             "look_settlement": looks[:, 1],
             "look_imbalance": looks[:, 2],

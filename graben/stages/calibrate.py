@@ -13,10 +13,9 @@ from graben.mechanics.materials.laws import LAWS
 from graben.mechanics.search.curves import Curve
 from graben.mechanics.search.first_state import settle
 from graben.mechanics.search.identifiability import identify
-from graben.schemas.artifact import write_artifact
 from graben.schemas.files import together
 from graben.schemas.layouts.calibration import LAYOUT
-from graben.schemas.outputs import MATERIAL, STATE, Outputs, beside, files_of
+from graben.schemas.outputs import MATERIAL, PARTIAL, STATE, Outputs, beside, files_of
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.material import material_text, write_material
@@ -27,6 +26,7 @@ from graben.stages.calibrate_problem import Problem, problem_of, sizes_of
 from graben.stages.calibrate_state import State, digest_of
 from graben.stages.calibrate_workers import workers_of
 from graben.stages.estimate import Estimate, refuse_too_large
+from graben.stages.last_good import keep_by, keeps_last_good, write_whole
 from graben.stages.measured import Reading, read_files
 from graben.stages.measures import warnings_of
 from graben.stages.record import Progress, Record, silent
@@ -84,6 +84,7 @@ def prepare(
     return Prepared(sources, problem, others, measured, unseen, read, sizes)
 
 
+@keeps_last_good("no start of the search had finished yet")
 def run(
     scene_path: Path,
     output: Path,
@@ -115,7 +116,7 @@ def run(
     BadInput : the scene or a curve has faults, or an output exists
     """
     scene: CalibrateScene = load_scene(scene_path, "calibrate", overrides)
-    outputs = Outputs(output, (MATERIAL,), kept=(STATE,))
+    outputs = Outputs(output, (MATERIAL,), kept=(STATE, PARTIAL))
     read = [*files_of(scene), *curves, *validate, *compare]
     outputs.claim(read, overwrite=overwrite, restart=restart)
     material_path = beside(output, MATERIAL)
@@ -132,6 +133,7 @@ def run(
         state = State(beside(output, STATE), digest_of(texts, sources), workers)
         if restart:
             state.load()
+        keep_by(lambda why: state.path if any(state.starts.values()) else None)
         objective, found = problem.solve(
             measured, problem.plan, state, "all curves", lambda part, words: progress(share * part, words)
         )
@@ -179,7 +181,7 @@ def run(
     headline["warnings"] = record.warnings = warnings_of(measures_of(headline))
     with together():
         write_material(material_path, scene.law, ordered, note)
-        write_artifact(output, LAYOUT, arrays, record, attributes)
+        write_whole(output, LAYOUT, arrays, record, attributes)
     state.finish()
     progress(1.0, "done")
     return {**headline, "read": prepared.read, "output": str(output), "material": str(material_path)}

@@ -90,6 +90,7 @@ def write_run(
     support_nodes: list[np.ndarray],
     external: Callable[[float], np.ndarray],
     headline: dict[str, Any],
+    partial: str = "",
 ) -> None:
     """Write the artifact and, beside it, the VTU series; fields are element means (damage: the largest)."""
     states = history.states()
@@ -154,7 +155,7 @@ def write_run(
                 }
                 points = {"displacement": movement[k], "gravity_displacement": gravity}
                 series.add(time, mesh.points, {"quad": mesh.quads}, points, fields)
-        write_artifact(path, LAYOUT, arrays, record, attributes)
+        write_artifact(path, LAYOUT, arrays, record, attributes, partial=partial)
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:

@@ -23,6 +23,7 @@ from graben.stages.estimate import Estimate, refuse_too_large
 from graben.stages.fem_mesh import mesh_of
 from graben.stages.fem_output import History, write_run
 from graben.stages.fem_sizes import sizes_of
+from graben.stages.last_good import keep_by, keeps_last_good
 from graben.stages.material import pack_material
 from graben.stages.measures import Measure, warnings_of
 from graben.stages.record import Progress, Record, silent
@@ -59,6 +60,7 @@ class Problem:
         return self.steady + time * self.rising
 
 
+@keeps_last_good("no step had been accepted yet")
 def run(
     scene_path: Path,
     output: Path,
@@ -101,18 +103,23 @@ def run(
     settled = march(body, body.untouched(), lambda t: t * problem.steady, 0.0, 1.0, _GRAVITY_STEPS, newton)
     settling = problem.unit_pressure / problem.loaded_length
     history = History(scene, settled, settling, problem.loaded_length, problem.offset)
+    headline: dict[str, Any] = {
+        "failed": True,
+        "failure_load_pa": None,
+        "compliance_ratio": 1.0,
+        "stiffness_ratio": 1.0,
+    }
+    carried = problem if settled.complete else replace(problem, steady=settled.time * problem.steady)
+
+    def write(path: Path, partial: str = "") -> Path:
+        nodes = problem.support_nodes
+        write_run(path, record, scene, body, settled, history, nodes, carried.external, headline, partial)
+        return path
+
+    keep_by(lambda why: write(last_good, why))
     if not settled.complete:
-        headline: dict[str, Any] = {
-            "failed": True,
-            "failure_load_pa": None,
-            "compliance_ratio": 1.0,
-            "stiffness_ratio": 1.0,
-        }
-        partial = replace(problem, steady=settled.time * problem.steady)
-        write_run(last_good, record, scene, body, settled, history, problem.support_nodes, partial.external, headline)
         raise NumericsFailed(
-            f"no equilibrium beyond {100 * settled.time:.3g} % of gravity ({settled.reason}); "
-            f"the state up to there is in {last_good}",
+            f"no equilibrium beyond {100 * settled.time:.3g} % of gravity ({settled.reason})",
             advice="the body does not stand under its own weight: check supports, strength and density",
         )
     loaded = _load_up(scene, problem, settled, newton, history, progress)
@@ -120,16 +127,14 @@ def run(
     headline = _headline(scene, problem, settled, loaded, history) | notes
     record.cost.update(_cost(body, settled, loaded, headline))
     headline["warnings"] = record.warnings = warnings_of(_measures(headline))
-    target = last_good if failed and scene.stepping.goal == "end" else output
     progress(0.98, "writing")
-    write_run(target, record, scene, body, settled, history, problem.support_nodes, problem.external, headline)
-    if target != output:
+    if failed and scene.stepping.goal == "end":
         raise NumericsFailed(
-            f"no equilibrium beyond load time {loaded.time:.6g} s of {scene.stepping.end:g} s ({loaded.reason}); "
-            f"states up to there are in {target}",
+            f"no equilibrium beyond load time {loaded.time:.6g} s of {scene.stepping.end:g} s ({loaded.reason})",
             step=len(loaded.iterations),
             advice='set stepping.goal = "failure" if this load is what you want, or lower stepping.smallest',
         )
+    write(output)
     progress(1.0, "done")
     return headline
 

@@ -11,12 +11,13 @@ import numpy as np
 from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.averaging.history import Average, average
 from graben.mechanics.averaging.rev import Circle, Polygon, Rev
-from graben.schemas.artifact import kind_of, write_artifact
+from graben.schemas.artifact import kind_of
 from graben.schemas.files import together
 from graben.schemas.layouts.curves import LAYOUT
 from graben.schemas.outputs import SERIES, Outputs
 from graben.schemas.vtk import vtu_series
 from graben.stages.block_history import Run, read_run
+from graben.stages.last_good import keeps_last_good, write_whole
 from graben.stages.measures import Measure, warnings_of
 from graben.stages.record import Progress, Record, silent
 
@@ -41,6 +42,7 @@ _SCALARS = (
 )
 
 
+@keeps_last_good("not all regions had been averaged yet")
 def run(
     inputs: Sequence[Path],
     output: Path,
@@ -115,7 +117,7 @@ def run(
             save_steps(steps_picture, jobs[0][0].history, averages[0].outline, jobs[0][1])
         if vtk:
             _write_vtk(output, jobs, averages)
-        write_artifact(output, LAYOUT, arrays, record, attributes)
+        write_whole(output, LAYOUT, arrays, record, attributes)
     return {
         "paths": [_headline(str(arrays["path_name"][k]), j, a) for k, (j, a) in enumerate(zip(jobs, averages))],
         "warnings": record.warnings,

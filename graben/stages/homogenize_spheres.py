@@ -15,8 +15,9 @@ import xarray
 
 from graben.errors import BadInput, Fault
 from graben.mechanics.averaging.spheres import best_fit_gradient, love_weber
-from graben.schemas.artifact import read_artifact, write_artifact
+from graben.schemas.artifact import read_artifact
 from graben.schemas.layouts.curves import LAYOUT
+from graben.stages.last_good import write_whole
 from graben.stages.record import Progress, Record
 
 _AXES = (0, 2, 1)
@@ -116,7 +117,7 @@ def run(
         "outline_chosen_at": chosen_at,
         "forces": "all, at every state" if whole else "normal forces between spheres, at the last state only",
     }
-    write_artifact(output, LAYOUT, arrays, record, attributes)
+    write_whole(output, LAYOUT, arrays, record, attributes)
     return {
         "paths": [_headline(n, p) for n, p in zip(names, paths)],
         "forces": attributes["forces"],

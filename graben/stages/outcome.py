@@ -19,7 +19,7 @@ def explain(error: BaseException) -> tuple[int, list[str]] | None:
     if isinstance(error, BadInput):
         return BAD_INPUT, [str(fault) for fault in error.faults]
     if isinstance(error, NumericsFailed | NotFinite):
-        return FAILED, [f"the numerics failed: {error}"]
+        return FAILED, [f"the numerics failed: {error}", *getattr(error, "__notes__", [])]
     if isinstance(error, MachineFailed):
         return FAILED, [str(error)]
     if isinstance(error, MemoryError):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault, NumericsFailed, Refused
+from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.particles.bed import (
     HISTORY,
     NOMINAL_FRACTION,
@@ -22,13 +22,13 @@ from graben.mechanics.particles.bed import (
 )
 from graben.mechanics.particles.law import LinearLaw, critical_step
 from graben.mechanics.particles.sampling import interval_over_areas, interval_over_beds
-from graben.schemas.artifact import write_artifact
 from graben.schemas.files import together
 from graben.schemas.layouts.particles import LAYOUT
-from graben.schemas.outputs import LAST_GOOD, SERIES, Outputs, beside
+from graben.schemas.outputs import LAST_GOOD, PARTIAL, SERIES, Outputs, beside
 from graben.schemas.scenes.particles import ParticlesScene
 from graben.schemas.vtk import vtu_series, write_vtu
 from graben.stages.estimate import Estimate, refuse_too_large, work
+from graben.stages.last_good import keep_by, keeps_last_good, write_whole
 from graben.stages.measures import Measure, warnings_of
 from graben.stages.record import Progress, Record, silent
 
@@ -40,9 +40,10 @@ _GRAIN_BYTES = 4000.0  # states, contacts and their histories
 
 def outputs_of(scene: ParticlesScene, output: Path) -> Outputs:
     """What a run writes, and what it leaves when it fails."""
-    return Outputs(output, SERIES if scene.output.vtk else (), kept=(LAST_GOOD + ".vtu",))
+    return Outputs(output, SERIES if scene.output.vtk else (), kept=(LAST_GOOD + ".vtu", PARTIAL))
 
 
+@keeps_last_good("no grain had moved yet")
 def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> dict[str, Any]:
     """Make the beds of a scene, write the artifact and its VTU files.
 
@@ -62,11 +63,9 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
     try:
         beds = [make_bed(law, recipe, scene.seed + b, _part(progress, b, scene.beds)) for b in range(scene.beds)]
     except BedFailed as failure:
-        kept = _write_last_good(output, failure.last_good)
-        raise NumericsFailed(
-            failure.what, where=failure.where, step=failure.step,
-            advice=f"{failure.advice}; the last good state is in {kept}",
-        ) from None  # fmt: skip
+        state = failure.last_good
+        keep_by(lambda why: _write_last_good(output, state))
+        raise
 
     arrays = _arrays(scene, law, beds)
     record.cost |= {
@@ -84,7 +83,7 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
     with together():
         if scene.output.vtk:
             _write_vtk(output, law, beds[0])
-        write_artifact(output, LAYOUT, arrays, record)
+        write_whole(output, LAYOUT, arrays, record)
     classes = [
         {
             "name": g.name,

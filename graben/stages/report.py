@@ -35,7 +35,7 @@ def run(folder: Path, output: Path, *, overwrite: bool = False, progress: Progre
     if output.suffix not in (".html", ".htm"):
         raise BadInput(Fault(str(output), "", "", "a page name ending in .html"))
     artifacts = sorted(folder.glob("*.nc"))
-    Outputs(output).claim(artifacts, overwrite=overwrite)
+    Outputs(output, kept=()).claim(artifacts, overwrite=overwrite)
     if not artifacts:
         raise BadInput(Fault(str(folder), "", "", "a folder with artifacts (*.nc)"))
     sections = []

@@ -20,7 +20,6 @@ from graben.mechanics.averaging.representative import (
     recommend,
 )
 from graben.mechanics.averaging.rev import Circle
-from graben.schemas.artifact import write_artifact
 from graben.schemas.layouts.rev_study import LAYOUT
 from graben.schemas.outputs import Outputs, files_of
 from graben.schemas.scene import load_scene
@@ -28,6 +27,7 @@ from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.rev_study import RevStudyScene
 from graben.stages.block_history import Run, read_run
 from graben.stages.estimate import Estimate, refuse_too_large
+from graben.stages.last_good import keeps_last_good, write_whole
 from graben.stages.measures import Measure, warnings_of
 from graben.stages.record import Progress, Record, silent
 from graben.stages.rev_calibration import Fits, check_law, chosen_parameters, fit_samples
@@ -65,6 +65,7 @@ def prepare(scene: RevStudyScene, runs: int = 1) -> tuple[CalibrateScene | None,
     return law, sizes
 
 
+@keeps_last_good("not all samples had been averaged yet")
 def run(
     inputs: Sequence[Path],
     scene: RevStudyScene,
@@ -154,7 +155,7 @@ def run(
     none = None if advice.radius else 1.0
     doubt = Measure("recommended_radius_m", none, 0.0, "no radius is recommended: " + advice.reason)
     record.warnings = warnings_of([doubt])
-    write_artifact(output, LAYOUT, arrays, record, attributes)
+    write_whole(output, LAYOUT, arrays, record, attributes)
     return {
         "recommended_radius_m": advice.radius,
         "reason": advice.reason,

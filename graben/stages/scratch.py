@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault, NumericsFailed
+from graben.errors import BadInput, Fault
 from graben.mechanics.continuum.scratch import run as mechanics
 from graben.mechanics.continuum.scratch.mesh import HexMesh, cells_along, specimen
 from graben.mechanics.materials.law import Law
 from graben.mechanics.materials.laws import LAWS
-from graben.schemas.outputs import LAST_GOOD, SERIES, Outputs, files_of
+from graben.schemas.outputs import LAST_GOOD, PARTIAL, SERIES, Outputs, files_of
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.scratch import ScratchScene
 from graben.stages.estimate import Estimate, refuse_too_large, work
+from graben.stages.last_good import keep_by, keeps_last_good
 from graben.stages.material import pack_material
 from graben.stages.measures import Measure, warnings_of
 from graben.stages.record import Progress, Record, silent
@@ -28,6 +29,7 @@ _BRICK_BYTES = 2000.0
 _STATE_BYTES = 400.0
 
 
+@keeps_last_good("the tip had not moved yet")
 def run(
     scene_path: Path,
     output: Path,
@@ -55,7 +57,7 @@ def run(
     NumericsFailed : energy, volume or mass error beyond the scene's limits; the last good state is kept as VTU
     """
     scene: ScratchScene = load_scene(scene_path, "scratch", overrides)
-    outputs = Outputs(output, SERIES, kept=(LAST_GOOD + ".vtu",))
+    outputs = Outputs(output, SERIES, kept=(LAST_GOOD + ".vtu", PARTIAL))
     outputs.claim([*files_of(scene), material], overwrite=overwrite)
     law, par, inputs, _ = prepare(scene, material)
     record = Record.begin(scene, inputs)
@@ -76,13 +78,9 @@ def run(
             _slots(law),
         )
     except mechanics.ScratchFailed as failure:
-        kept = write_last_good(output, mesh, failure.last_good)
-        raise NumericsFailed(
-            failure.what,
-            where=failure.where,
-            step=failure.step,
-            advice=f"{failure.advice}; the last good state is in {kept}",
-        ) from None
+        state = failure.last_good
+        keep_by(lambda why: write_last_good(output, mesh, state))
+        raise
     progress(0.99, "sections")
     groove = measure_groove(scene, mesh, result)
     headline = {**groove.headline, **_cost(result)}

@@ -11,12 +11,12 @@ import numpy as np
 from graben.mechanics.continuum.scratch.mesh import HexMesh
 from graben.mechanics.continuum.scratch.run import ENERGIES, ScratchRun, Snapshot
 from graben.mechanics.wear.groove import Section, VolumeLedger, cut, measure, volume_ledger
-from graben.schemas.artifact import write_artifact
 from graben.schemas.files import together
 from graben.schemas.layouts.scratch import LAYOUT
 from graben.schemas.outputs import LAST_GOOD, beside
 from graben.schemas.scenes.scratch import ScratchScene
 from graben.schemas.vtk import vtu_series, write_vtu
+from graben.stages.last_good import write_whole
 from graben.stages.measures import number
 from graben.stages.record import Record
 
@@ -173,7 +173,7 @@ def write_run(
         with vtu_series(output) as series:
             for frame in result.frames:
                 series.add(frame.time, *fields(mesh, frame))
-        write_artifact(output, LAYOUT, arrays, record)
+        write_whole(output, LAYOUT, arrays, record)
 
 
 def write_last_good(output: Path, mesh: HexMesh, frame: Snapshot) -> Path:

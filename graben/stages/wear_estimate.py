@@ -12,11 +12,12 @@ import numpy as np
 from graben.errors import BadInput, Fault, Incomplete, Refused
 from graben.mechanics.wear.counts import contacts_per_area, doubts
 from graben.mechanics.wear.rate import GrooveTable, balanced_forces, carried_load, wear_rates
-from graben.schemas.artifact import read_artifact, write_artifact
+from graben.schemas.artifact import read_artifact
 from graben.schemas.layouts.wear import LAYOUT
 from graben.schemas.outputs import Outputs, files_of
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.wear import Mixture, WearScene
+from graben.stages.last_good import keeps_last_good, write_whole
 from graben.stages.record import Progress, Record, silent
 
 # carried over applied load may differ by this much before a warning
@@ -41,6 +42,7 @@ class _BedCounts:
     share: np.ndarray
 
 
+@keeps_last_good("no mixture had been rated yet")
 def run(
     scene_path: Path,
     output: Path,
@@ -83,7 +85,7 @@ def run(
         "contact_area": scene.machine.contact_area,
     }
     record.cost["mixtures"] = len(rows)
-    write_artifact(output, LAYOUT, arrays, record, {"load_mode": scene.load.mode})
+    write_whole(output, LAYOUT, arrays, record, {"load_mode": scene.load.mode})
     names = [g.name for g in scene.grains]
     return {
         "mixtures": [

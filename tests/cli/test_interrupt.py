@@ -71,7 +71,7 @@ def test_a_signal_during_imports_ends_the_program(library, number, tmp_path):
 
 
 @pytest.mark.parametrize("number", SIGNALS)
-@pytest.mark.parametrize("place", ["load_scene", "_rate", "write_artifact"])
+@pytest.mark.parametrize("place", ["load_scene", "_rate", "write_whole"])
 def test_a_signal_at_any_step_of_a_stage_leaves_nothing(place, number, tmp_path, monkeypatch):
     stage = import_module("graben.stages.wear_estimate")
     real = getattr(stage, place)

@@ -86,6 +86,11 @@ class History:
         self.overlap.append(float(m.motion.sums[rx.LARGEST_OVERLAP]))
         self.damping.append(float(m.motion.drive[rx.DAMPING]))
 
+    def cut(self, states: int) -> None:
+        """Forget all but the first saved states."""
+        for rows in (self.time, self.overlap, self.damping, *self.rows.values()):
+            del rows[states:]
+
     def stored(self, states: int) -> dict[str, np.ndarray]:
         """The first saved states as arrays that `bring_back` takes."""
         result = {"reference": self.reference, "start_time": np.array(self.start_time)}
