@@ -7,6 +7,7 @@ passed over. Signals that were ignored when the process began (nohup) stay ignor
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
@@ -33,8 +34,11 @@ class _State:
 
 def take() -> None:
     """From now on signals end this process with exit code 130; for the programs that graben installs."""
-    _State.process = os.getpid()
-    _set()
+    if _State.process != os.getpid():
+        _State.process = os.getpid()
+        _set()
+        # The interpreter puts back what ends a process by the signal while it still tidies up.
+        atexit.register(lambda: [signal.signal(number, signal.SIG_IGN) for number in _SIGNALS])
 
 
 def _set() -> dict[int, Any]:

@@ -196,6 +196,17 @@ def test_a_signal_after_the_outputs_are_in_place_is_passed_over():
     assert (result.exit_code, result.stdout) == (0, "done\n")
 
 
+def test_a_signal_while_the_interpreter_ends_changes_nothing(tmp_path):
+    script = (
+        "import os, sys\n"
+        "class Last:\n    def __del__(self, kill=os.kill, process=os.getpid()):\n        kill(process, 15)\n"
+        "last = Last()\nfrom graben.cli.start import wear_estimate\nwear_estimate()"
+    )
+    run = child(script, PIPELINES / "wear/astm-g65-mixtures.toml", "-q", "-o", tmp_path / "out.nc")
+    _, said = run.communicate(timeout=120)
+    assert run.returncode == 0, said
+
+
 def test_what_was_ignored_when_the_process_began_stays_ignored():
     former = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
