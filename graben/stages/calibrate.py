@@ -10,6 +10,7 @@ from typing import Any
 
 from graben.errors import BadInput, Fault, Incomplete, Refused
 from graben.mechanics.materials.laws import LAWS
+from graben.mechanics.search.agreement import agreement
 from graben.mechanics.search.curves import Curve
 from graben.mechanics.search.first_state import settle
 from graben.mechanics.search.identifiability import identify
@@ -159,6 +160,7 @@ def run(
         precision=problem.priors.precision(problem.box.size), beside=settled.beside[data], noise=settled.noise[data],
         floor=fit.floor,
     )  # fmt: skip
+    starts = agreement(found.ends, found.end_values, known.robust_error, points=fit.groups.size, floor=fit.floor)
     near = found.member_values <= _NEAR * found.best.value
     members = distinct(found.members[near])
     material = {**problem.fixed, **dict(zip(problem.box.names, (float(v) for v in values)))}
@@ -175,9 +177,12 @@ def run(
         "rmse_pa": errors["stress"],
         "objective": best.value,
         "search_ended": best.reason,
+        "starts": starts.verdict,
         "read": json.dumps(prepared.read),
     }
-    headline = headline_of(scene, problem, measured, unseen, values, known, errors, holdout, arrays, candidates)
+    headline = headline_of(
+        scene, problem, measured, unseen, values, known, starts, errors, holdout, arrays, candidates
+    )
     headline["warnings"] = record.warnings = warnings_of(measures_of(headline))
     with together():
         write_material(material_path, scene.law, ordered, note)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from graben.mechanics.materials.laws import LAWS
+from graben.mechanics.search.agreement import Agreement, rank
 from graben.mechanics.search.curves import Curve, CurveFit
 from graben.mechanics.search.identifiability import Identifiability
 from graben.mechanics.search.multistart import Found
@@ -63,6 +64,7 @@ def arrays_of(
         "standard_error_independent": known.standard_error * slope,
         "at_bound": bound.astype(np.int8),
         "identifiable": known.identifiable.astype(np.int8),
+        "doubtful": known.doubtful.astype(np.int8),
         "covariance": known.covariance,
         "correlation": known.correlation,
         "direction": known.directions,
@@ -123,7 +125,7 @@ def _prediction_error(
 
 def headline_of(
     scene: CalibrateScene, problem: Problem, measured: Sequence[Curve], unseen: Sequence[Curve],
-    values: np.ndarray, known: Identifiability, errors: dict[str, Any], holdout: np.ndarray | None,
+    values: np.ndarray, known: Identifiability, starts: Agreement, errors: dict[str, Any], holdout: np.ndarray | None,
     arrays: dict[str, Any], candidates: Sequence[Candidate],
 ) -> dict[str, Any]:  # fmt: skip
     names = problem.box.names
@@ -136,14 +138,24 @@ def headline_of(
         "curve_rmse_pa": {c.name: float(e) for c, e in zip(measured, errors["stress_per_curve"])},
         "incomplete": [c.name for c, ok in zip(measured, errors["complete"]) if not ok],
         "at_bounds": [n for n, b in zip(names, arrays["at_bound"]) if b],
-        "not_identifiable": [n for n, ok, free in zip(names, known.identifiable, known.free) if free and not ok],
+        "near_bounds": [n for n, near in zip(names, known.near_bound) if near],
+        "not_identifiable": [n for n, lost in zip(names, unseen_parameters(known)) if lost],
+        "doubtful": [n for n, between in zip(names, known.doubtful) if between],
         "unseen_directions": int(known.unseen.sum()),
+        "steps_to_go": {n: _finite(p) for n, p in zip(names, known.pending)},
+        "starts": starts.verdict,
+        "starts_rms_ratio": _finite(starts.ratio),
+        "starts_apart": {names[starts.parameter]: _finite(starts.apart)},
     }
     if holdout is not None:
         out["holdout_rmse_pa"] = {c.name: _finite(e) for c, e in zip(measured, holdout)}
         out["cross_validation_rmse_pa"] = _finite(float(np.sqrt(np.mean(holdout**2))))
     if candidates:
-        table = sorted(candidates, key=lambda c: c.cross_validated if math.isfinite(c.cross_validated) else math.inf)
+        order, close = rank(
+            np.array([c.cross_validated for c in candidates]), np.array([c.parameters for c in candidates])
+        )
+        table = [candidates[i] for i in order]
+        out["as_good_as_the_best"] = [candidates[i].name for i in close[1:]]
         out["comparison"] = [
             {
                 "name": c.name,
@@ -176,7 +188,31 @@ def measures_of(headline: dict[str, Any]) -> list[Measure]:
         some("incomplete", "the law cannot follow these curves to their ends"),
         some("at_bounds", "the bound chose the value, not the curves: widen it in [free], or fix the parameter"),
         some("not_identifiable", "the curves do not tell these parameters apart: fix some, or add curves"),
+        some(
+            "doubtful", "the curves about halve what the bounds leave open, which is little: fix some, or add curves"
+        ),
+        Measure("starts", float(headline["starts"] != "agree"), 0.0, _of_starts(headline)),
     ]
+
+
+def _of_starts(headline: dict[str, Any]) -> str:
+    if headline["starts"] == "single":
+        return "one start only, so nothing tells whether another would find a better fit: raise swarm.starts"
+    ((name, apart),) = headline["starts_apart"].items()
+    ratio = headline["starts_rms_ratio"]
+    parts = (
+        "differ beyond measure" if ratio is None else f"differ by {100.0 * (ratio - 1.0):.2g} % (root mean square)"
+    )
+    told = "disagree" if headline["starts"] == "disagree" else "agree only roughly"
+    return (
+        f"the two best starts {told}: their objectives {parts}, {name} by {apart:.2g} standard errors: raise "
+        "swarm.starts, or fix parameters"
+    )
+
+
+def unseen_parameters(known: Identifiability) -> np.ndarray:
+    """(k,) true where a free parameter is neither identifiable nor doubtful."""
+    return known.free & ~known.identifiable & ~known.doubtful
 
 
 def _finite(value: float) -> float | None:

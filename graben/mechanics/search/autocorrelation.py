@@ -41,6 +41,12 @@ def _expected(parts: list[Array], rho: float) -> tuple[float, Array]:
     return float(lagged), squares
 
 
+def _basis(columns: Array) -> Array:
+    """Orthonormal basis of what columns (m, k) span; those that are rounding only, or nil, span nothing."""
+    u, size, _vt = np.linalg.svd(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), full_matrices=False)
+    return np.asarray(u[:, size > 1e-6])
+
+
 def lasting_meat(j: Array, r: Array, groups: NDArray[np.int64], beside: Array | None = None) -> tuple[Array, float]:
     """J^T S J (k, k) with S the covariance of errors estimated from residuals r (m,) with Jacobian j (m, k), and rho.
 
@@ -60,7 +66,7 @@ def lasting_meat(j: Array, r: Array, groups: NDArray[np.int64], beside: Array | 
         size = np.ones(len(r))
         for b, v in zip(members, variance):
             size[b] = np.sqrt(v)
-        basis = np.linalg.qr(taken / size[:, None])[0]
+        basis = _basis(taken / size[:, None])
         parts = [basis[b] for b in members]
         shown = sum(float(r[b][1:] @ r[b][:-1]) / v for b, v in zip(members, variance)) / np.sum(square / variance)
         low, high = 0.0, _LARGEST

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Residuals = Callable[[Array], Array]
 
+_ROUNDING = 1e-7  # of the longest column of a Jacobian: what is shorter is not scaled to unit length
+
 
 @dataclass(frozen=True)
 class FitResult:
@@ -86,7 +88,8 @@ def levenberg_marquardt(
         if free.size == 0 or value == 0.0 or not norms[free].any():
             reason = "no parameter can improve it"
             break
-        s = np.where(scale[free] > 0.0, scale[free], 1.0)
+        # columns of rounding are not blown up: their steps would take the whole move
+        s = np.maximum(scale[free], _ROUNDING * scale.max())
         # one decomposition serves every damping
         stiff, axes = np.linalg.eigh(gram[np.ix_(free, free)] / (s * s[:, None]))
         right = -(gradient[free] / s) @ axes

@@ -77,7 +77,8 @@ class Help:
 class Found:
     """best: the best refined fit. members (j, k) and member_values (j,): every refined set, best first.
 
-    history (generations + 1,): best value of the global search that led to the best fit; evaluations in all.
+    history (generations + 1,): best value of the global search that led to the best fit; evaluations in all. ends
+    (starts, k), end_values (starts,): the best of each start.
     """
 
     best: FitResult
@@ -85,6 +86,8 @@ class Found:
     member_values: Array
     history: Array
     evaluations: int
+    ends: Array
+    end_values: Array
 
 
 def sum_of_squares(residuals: Residuals, points: Array) -> Array:
@@ -149,7 +152,10 @@ def search(
     best = FitResult(
         x, residuals(x[None])[0], float(values[top]), jacobian(residuals, x, 1e-4), 0, evaluations, reasons[top]
     )
-    return Found(best, members[order], values[order], every[owner[top]].history, evaluations)
+    tops = [int(np.argmin(s.values)) for s in every]
+    ends = np.array([s.members[i] for s, i in zip(every, tops)])
+    end_values = np.array([s.values[i] for s, i in zip(every, tops)])
+    return Found(best, members[order], values[order], every[owner[top]].history, evaluations, ends, end_values)
 
 
 def one_start(

@@ -48,6 +48,9 @@ LAYOUT = Layout(
         ),
         "at_bound": Variable(_P, "1", "-1 at the lower bound, 1 at the upper, else 0", dtype="i1"),
         "identifiable": Variable(_P, "1", "1 where the curves narrow it down beyond its bounds", dtype="i1"),
+        "doubtful": Variable(
+            _P, "1", "1 where they narrow it down about by half: neither known nor unknown", dtype="i1", optional=True
+        ),
         "covariance": Variable(
             ("parameter", "other"),
             "1",

@@ -103,3 +103,59 @@ def test_an_autoregressive_sequence_is_seen_through_what_a_fit_takes_of_it(rho):
     # one standard error of rho on the safe side
     assert np.mean(shown) == pytest.approx(rho + np.sqrt((1 - rho**2) / 240), abs=0.04)
     assert 0.95 < np.mean(found) < 1.15
+
+
+def smooth(seed=0, m=120, noise=1e-3):
+    """Two parameters that are seen, one that is computed as rounding only: residuals, jacobian, its noise."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 1, m)
+    j = np.stack([np.ones(m), t, 1e-9 * rng.normal(size=m)], axis=1)
+    n = np.stack([1e-7 * t, 1e-7 * t**2, 1e-9 * rng.normal(size=m)], axis=1)
+    return noise * rng.normal(size=m), j, n
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-12, 0.0])
+def test_a_column_of_rounding_is_not_seen_however_exact_the_data(noise):
+    r, j, n = smooth(noise=noise)
+    x = np.array([0.4, 0.5, 0.6])
+    k = identify(x, r, j, noise=n, floor=1e-10)
+    assert k.identifiable.tolist() == [True, True, False] and k.unseen.tolist() == [True, False, False]
+    assert k.standard_error[2] == pytest.approx(UNSEEN, rel=1e-6) and not k.doubtful.any()
+    assert k.standard_error[0] >= 1e-10 / np.sqrt(len(r))
+    if noise < 1e-10:  # without the noise: an absurdly small error of something that is not there
+        assert identify(x, r, j).standard_error[2] < 0.1 * UNSEEN
+
+
+@pytest.mark.parametrize("unit", [1e-12, 1e-3, 1e6])
+def test_errors_and_verdicts_do_not_depend_on_units(unit):
+    r, j, n = smooth()
+    x = np.array([0.4, 0.5, 0.6])
+    groups = np.repeat([0, 1, 2], 40)
+    one = identify(x, r, j, noise=n, floor=1e-10, groups=groups, lag=3)
+    other = identify(x, unit * r, unit * j, noise=unit * n, floor=unit * 1e-10, groups=groups, lag=3)
+    np.testing.assert_allclose(other.robust_error, one.robust_error, rtol=1e-6)
+    np.testing.assert_array_equal(other.identifiable, one.identifiable)
+
+
+def test_verdicts_stay_when_inputs_are_blurred_or_added_up_in_another_order():
+    r, j, n = smooth(noise=0.02)
+    j[:, 1] *= 0.04  # about half of what the bounds leave open: in the grey zone
+    x, rng = np.array([0.4, 0.5, 0.6]), np.random.default_rng(5)
+    wanted = identify(x, r, j, noise=n)
+    assert wanted.doubtful.tolist() == [False, True, False]
+    for _ in range(20):
+        rows, factor = rng.permutation(len(r)), 1.0 + 1e-9 * rng.normal(size=(len(r), 1))
+        got = identify(x, (r * factor[:, 0])[rows], (j * factor)[rows], noise=n[rows])
+        for name in ("identifiable", "doubtful", "unseen", "direction_doubtful", "near_bound", "free"):
+            np.testing.assert_array_equal(getattr(got, name), getattr(wanted, name))
+
+
+def test_a_search_that_stopped_early_says_how_far_it_had_to_go():
+    a, x, _r, _truth = line(noise=1e-3)
+    y = a @ x + 1e-3 * np.random.default_rng(1).normal(size=len(a))
+    best = np.linalg.lstsq(a, y, rcond=None)[0]
+    early = best + np.array([0.01, -0.02])
+    k = identify(early, a @ early - y, a)
+    assert (k.robust_error > np.abs(early - best)).all() and (k.pending > 0.9).all()
+    done = identify(best, a @ best - y, a)
+    assert (done.pending < 1e-6).all() and (done.robust_error < 1e-3).all()
