@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 _SAME, _OTHER = 1.01, 1.05  # ratios of root mean squares
 _WITHIN, _BEYOND = 2.0, 4.0  # standard errors
-_LEAST, _HELD = 1e-4, 1e-2  # of a range: errors are not taken smaller; of what a bound holds
+_LEAST, _HELD = 1e-4, 0.1  # of a range: errors are not taken smaller; what a bound holds has none, so a tenth
 _CLOSE = 0.05  # cross-validated errors this much apart choose between laws
 
 

@@ -17,7 +17,8 @@ BEST = np.array([0.4, 0.6, 1.0])
         ([1.0, 1.0001, 9.0], [0.0, 0.2, 0.0], "disagree"),  # the same, by other parameters
         ([1.0, 1.06, 9.0], [0.0, 0.0, 0.0], "doubtful"),
         ([1.0, 1.0, 9.0], [0.03, 0.0, 0.0], "doubtful"),
-        ([1.0, 1.0, 9.0], [0.0, 0.0, -0.3], "disagree"),  # one at a bound, one not
+        ([1.0, 1.0, 9.0], [0.0, 0.0, -0.1], "agree"),
+        ([1.0, 1.0, 9.0], [0.0, 0.0, -0.6], "disagree"),  # one at a bound, one not
     ],
 )
 def test_the_two_best_starts_decide_and_rounding_does_not(values, move, verdict):
