@@ -33,7 +33,7 @@ from graben.stages.last_good import keep_by, keeps_last_good, write_whole
 from graben.stages.measures import warnings_of
 from graben.stages.record import Progress, Record, silent
 
-# Steps of loading for each fidelity; their measured trade is in docs/manual/dem-run-blocks.md
+# Steps of loading for each fidelity; their measured trade is in docs/studies/blocks-fidelity.md
 FIDELITY = {"draft": 12_500, "standard": 50_000, "reference": 200_000}
 
 # How a loading went that follows a force check.
