@@ -18,7 +18,7 @@ from graben.stages.check import examine
 ROOT = Path(__file__).parents[1]
 DOCS = sorted((ROOT / "docs").rglob("*.md"))
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS]
-PLAIN = [p for p in DOCS if p.parent.name in ("manual", "tutorials")]
+MANUAL = [p for p in DOCS if p.parent.name in ("manual", "tutorials")]
 BIBLIOGRAPHY = ROOT / "docs" / "references.bib"
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", flags=re.M | re.S)
 MOST_LINES, WIDEST, MOST_WORDS = 130, 100, 25
@@ -158,7 +158,7 @@ def test_python_in_the_text_runs(page, tmp_path, monkeypatch):
             exec(compile(text, name(page), "exec"), {})
 
 
-@pages(PLAIN)
+@pages(MANUAL)
 def test_names_in_the_text_exist_in_the_code(page):
     """Keys, variables and headline numbers: words in backquotes with an underscore."""
     files = [p for room in ("graben", "pipelines") for p in (ROOT / room).rglob("*") if p.suffix in (".py", ".toml")]
@@ -175,11 +175,15 @@ def test_lines_are_short(page):
             assert len(re.sub(r"\]\([^)]*\)", "]", line)) <= WIDEST, line
 
 
-@pages(PLAIN)
-def test_pages_of_the_manual_are_short_and_plain(page):
-    assert len(read(page).splitlines()) <= MOST_LINES
+@pages(PAGES)
+def test_sentences_are_short(page):
     for sentence in sentences(read(page)):
         assert len(sentence.split()) <= MOST_WORDS, sentence
+
+
+@pages(MANUAL)
+def test_pages_of_the_manual_are_short(page):
+    assert len(read(page).splitlines()) <= MOST_LINES
 
 
 @pages([p for p in DOCS if p.parent.name == "studies" and p.name != "README.md"])
