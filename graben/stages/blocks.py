@@ -27,14 +27,11 @@ from graben.stages.blocks_geometry import Ground, lay_out
 from graben.stages.blocks_joints import joints_of_sets
 from graben.stages.blocks_output import write_vtk
 from graben.stages.blocks_programme import Rising
-from graben.stages.blocks_sizes import sizes_of
+from graben.stages.blocks_sizes import sizes_of, steps_of
 from graben.stages.estimate import Estimate, refuse_too_large
 from graben.stages.last_good import keep_by, keeps_last_good, write_whole
 from graben.stages.measures import warnings_of
 from graben.stages.record import Progress, Record, silent
-
-# Steps of loading for each fidelity; their measured trade is in docs/studies/blocks-fidelity.md
-FIDELITY = {"draft": 12_500, "standard": 50_000, "reference": 200_000}
 
 # How a loading went that follows a force check.
 _PACED = ("loading_steps", "force_check_worst", "force_check_mean")
@@ -143,16 +140,16 @@ def prepare(scene: BlocksScene) -> Prepared:
     BadInput : the scene is too large, or the mechanics refuse it
     """
     file, programme = scene.source.path, scene.programme
-    steps = scene.numerics.steps or FIDELITY[scene.fidelity]
-    sizes = sizes_of(scene, steps)
+    sizes = sizes_of(scene)
     refuse_too_large(file, sizes)
-    if programme is None and scene.loading.states > steps + 1:
-        expected = f"at most {steps + 1}: one state a step"
-        raise BadInput(Fault(str(file), "loading.states", str(scene.loading.states), expected))
     duration = scene.loading.duration if programme is None else programme.end
     gravity = (0.0, 0.0) if programme is None else (programme.horizontal, programme.vertical)
     ground = lay_out(scene)
     scene = ground.scene
+    steps = steps_of(scene, ground.blocks.size)
+    if programme is None and scene.loading.states > steps + 1:
+        expected = f"at most {steps + 1}: one state a step"
+        raise BadInput(Fault(str(file), "loading.states", str(scene.loading.states), expected))
     try:
         model = _model(scene, ground.blocks, duration / steps, gravity)
         _put_stress_in(scene, model)
