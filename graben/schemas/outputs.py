@@ -9,7 +9,7 @@ import tempfile
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -53,10 +53,6 @@ class Outputs:
     ends: tuple[str, ...] = ()
     kept: tuple[str, ...] = (PARTIAL,)
     others: tuple[Path, ...] = ()
-    _kept: frozenset[Path] = field(init=False, default=frozenset())
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_kept", frozenset(beside(self.main, e) for e in self.kept))
 
     def paths(self) -> list[Path]:
         """All of them, the main one first."""
@@ -77,16 +73,17 @@ class Outputs:
             that is no name for a regular file
         MachineFailed : a folder that cannot be written, or a full disk
         """
-        paths = self.paths()
         if self.main.name in ("", ".."):
             raise BadInput(Fault(str(self.main), "", "", "a file name for the output, not a folder"))
+        paths, kept = self.paths(), {beside(self.main, end) for end in self.kept}
         recover(paths[1:], self.main)
         faults = list(self._clashes([p for p in inputs if p is not None]))
         taken = {Path(f.file) for f in faults}
         for path in paths:
-            if path not in taken:
-                faults += self._faults_of(path, overwrite or (restart and path in self._kept))
-        faults += self._twin()
+            # What a restart reads is judged, and named, where it is read.
+            if path not in taken and not (restart and path in kept and path.is_file()):
+                faults += self._faults_of(path, overwrite, path in kept)
+        faults += self._twin() if not faults else []
         faults += [f for p in paths for f in _misplaced(p)] if not faults else []
         if faults:
             raise BadInput(faults)
@@ -107,7 +104,7 @@ class Outputs:
         if name_of(self.main).endswith(_RESERVED) and self.main.suffix == ".nc":
             yield Fault(str(self.main), "", "", "another name: runs that fail leave files of such names")
 
-    def _faults_of(self, path: Path, may_replace: bool) -> Iterator[Fault]:
+    def _faults_of(self, path: Path, may_replace: bool, kept: bool) -> Iterator[Fault]:
         try:
             found = path.lstat()
         except FileNotFoundError:
@@ -122,7 +119,7 @@ class Outputs:
         elif not (folder or stat.S_ISREG(found.st_mode)):
             yield Fault(str(path), "", "", f"a regular file or a free name, not a {_what(found.st_mode)}")
         elif not may_replace:
-            ways = "--restart or --overwrite" if path in self._kept and path.suffix == ".npz" else "--overwrite"
+            ways = "--restart or --overwrite" if kept and path.suffix == ".npz" else "--overwrite"
             yield Fault(str(path), "", "", f"an output that does not exist yet (or {ways})")
         elif not self._ours(path):
             yield Fault(str(path), "", "", "a file that graben wrote, to replace it: move away what lies there")

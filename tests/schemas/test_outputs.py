@@ -56,7 +56,7 @@ def test_runs_of_different_names_share_no_output(tmp_path):
 def test_the_name_with_and_without_its_suffix_would_share_what_lies_beside(tmp_path, small_blocks):
     (tmp_path / "a.nc").write_bytes(small_blocks.read_bytes())
     assert "a.nc" in refused(Outputs(tmp_path / "a", SERIES), overwrite=True)
-    Outputs(tmp_path / "a").claim([])
+    Outputs(tmp_path / "a", kept=()).claim([])
 
 
 def test_a_free_place_is_taken_and_nothing_left_there(tmp_path):
