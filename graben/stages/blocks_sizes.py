@@ -10,7 +10,7 @@ import numpy as np
 from graben.schemas.scenes.blocks import BlocksScene, Tessellation
 from graben.stages.estimate import Estimate, tiles, work
 
-# Steps of loading for each fidelity; their measured trade is in the documentation of blocks.
+# Steps of loading for each fidelity; their measured trade is in docs/studies/blocks-fidelity.md
 FIDELITY = {"draft": 12_500, "standard": 50_000, "reference": 200_000}
 # Largest inertial number of a compression. Measured: kinetic stays below 5 % of stored energy from 0.1 to 4 MPa.
 _INERTIA = 0.0125
