@@ -1,3 +1,54 @@
-"""graben: from a scene of discrete rock or sand to numbers an engineer can use."""
+"""graben: from a scene of discrete rock or sand to numbers an engineer can use.
+
+Public names are imported when they are first used, so that ``import graben`` costs nothing. See docs/python.md.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+_HOME = {
+    "run": "graben.api.stages",
+    "homogenize": "graben.api.stages",
+    "Result": "graben.api.stages",
+    "scene": "graben.api.scenes",
+    "check": "graben.api.scenes",
+    "open": "graben.api.artifacts",
+    "provenance": "graben.api.artifacts",
+    "Provenance": "graben.api.artifacts",
+    "GrabenError": "graben.errors",
+    "BadInput": "graben.errors",
+    "Fault": "graben.errors",
+    "NumericsFailed": "graben.errors",
+}
+
+if TYPE_CHECKING:
+    from graben.api.artifacts import Provenance as Provenance
+    from graben.api.artifacts import open as open
+    from graben.api.artifacts import provenance as provenance
+    from graben.api.scenes import check as check
+    from graben.api.scenes import scene as scene
+    from graben.api.stages import Result as Result
+    from graben.api.stages import homogenize as homogenize
+    from graben.api.stages import run as run
+    from graben.errors import BadInput as BadInput
+    from graben.errors import Fault as Fault
+    from graben.errors import GrabenError as GrabenError
+    from graben.errors import NumericsFailed as NumericsFailed
+
+__all__ = sorted([*_HOME, "__version__"])
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'graben' has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

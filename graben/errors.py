@@ -17,15 +17,20 @@ class GrabenError(Exception):
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault: the file, the key or variable in it, the value found, and what was expected."""
+    """One fault: the file, the key or variable in it, the value found, and what was expected.
+
+    argument : the key is no key of a file but an argument of the call. Texts name arguments in `backticks`; the
+        command line shows both as its options
+    """
 
     file: str
     key: str
     value: str
     expected: str
+    argument: bool = False
 
     def __str__(self) -> str:
-        place = f"{self.file}: {self.key}" if self.key else self.file
+        place = ": ".join(part for part in (self.file, self.key) if part)
         found = f" = {self.value}" if self.value else ""
         return f"{place}{found}: expected {self.expected}"
 
@@ -42,7 +47,7 @@ class BadInput(GrabenError, ValueError):
 
 
 class Incomplete(BadInput):
-    """The only faults of a scene are files that the command line may still name: no fault of the scene by itself."""
+    """The only faults of a scene are files that the call may still name: no fault of the scene by itself."""
 
 
 class Refused(GrabenError, ValueError):

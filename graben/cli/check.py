@@ -32,5 +32,7 @@ def main(session: Session, files: tuple[Path, ...]) -> None:
 
 def _words(absent: list[Fault]) -> str:
     """Needs of the command line do not make a scene faulty."""
-    needs = "; ".join(f"{fault.key}: {fault.expected}" for fault in absent)
+    from graben.stages.outcome import as_options
+
+    needs = "; ".join(f"{fault.key}: {fault.expected}" for fault in map(as_options, absent))
     return f"no fault; to run it needs {needs}" if needs else "no fault"

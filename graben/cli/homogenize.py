@@ -9,29 +9,29 @@ import click
 from graben.cli.options import FILE, Session, Tool, stage_options
 
 
-def _length(text: str, option: str) -> float:
+def _length(text: str, argument: str) -> float:
     from graben.errors import BadInput, Fault, Refused
     from graben.schemas.quantities import to_si
 
     try:
         return to_si(text, "m")
     except Refused as error:
-        raise BadInput(Fault("homogenize", option, repr(text), str(error))) from error
+        raise BadInput(Fault("homogenize", argument, repr(text), str(error), True)) from error
 
 
-def _point(text: str, option: str) -> tuple[float, float]:
+def _point(text: str, argument: str) -> tuple[float, float]:
     from graben.errors import BadInput, Fault
 
     parts = text.split(",")
     if len(parts) != 2:
-        raise BadInput(Fault("homogenize", option, repr(text), 'two lengths, such as "5 m, 5 m"'))
-    return _length(parts[0], option), _length(parts[1], option)
+        raise BadInput(Fault("homogenize", argument, repr(text), 'two lengths, such as "5 m, 5 m"', True))
+    return _length(parts[0], argument), _length(parts[1], argument)
 
 
 def _centre(text: str) -> tuple[float, ...]:
     if text.count(",") == 2:
-        return tuple(_length(part, "--centre") for part in text.split(","))
-    return _point(text, "--centre")
+        return tuple(_length(part, "centre") for part in text.split(","))
+    return _point(text, "centre")
 
 
 @click.command("homogenize", cls=Tool)
@@ -70,12 +70,12 @@ def main(
     """
     from graben.stages import homogenize
 
-    corners = [_point(p, "--polygon") for p in polygon.split(";") if p.strip()] if polygon else []
+    corners = [_point(p, "polygon") for p in polygon.split(";") if p.strip()] if polygon else []
     with session.progress() as progress:
         headline = homogenize.run(
             inputs,
             output,
-            radii=[_length(r, "--radius") for r in radii],
+            radii=[_length(r, "radius") for r in radii],
             centre=_centre(centre) if centre else None,
             polygon=corners,
             deformed=deformed,

@@ -119,13 +119,13 @@ class Outputs:
         elif not (folder or stat.S_ISREG(found.st_mode)):
             yield Fault(str(path), "", "", f"a regular file or a free name, not a {_what(found.st_mode)}")
         elif not may_replace:
-            ways = "--restart or --overwrite" if kept and path.suffix == ".npz" else "--overwrite"
+            ways = "`restart` or `overwrite`" if kept and path.suffix == ".npz" else "`overwrite`"
             yield Fault(str(path), "", "", f"an output that does not exist yet (or {ways})")
         elif not self._ours(path):
             yield Fault(str(path), "", "", "a file that graben wrote, to replace it: move away what lies there")
 
     def _ours(self, path: Path) -> bool:
-        """Whether graben wrote what lies there, so that --overwrite may replace it."""
+        """Whether graben wrote what lies there, so that `overwrite` may replace it."""
         with suppress(OSError, ValueError, KeyError, RuntimeError):
             if path.suffix == FOLDER and path.is_dir():
                 return all(re.fullmatch(r"\d{4,}\.vtu", p.name) and p.is_file() for p in path.iterdir())

@@ -54,11 +54,11 @@ def read_saved(path: Path, owner: Mapping[str, str], expected: str) -> Arrays:
         found = str(stored.pop(_DIGEST, "(absent)"))
         damaged = found != _digest(stored)
     except Exception as error:  # whatever damaged bytes make of the readers of zip, zlib and npy
-        raise BadInput(Fault(str(path), "--restart", "", f"a whole file of saved states ({error})")) from None
+        raise BadInput(Fault(str(path), "restart", "", f"a whole file of saved states ({error})", True)) from None
     if damaged:
         raise BadInput(Fault(str(path), _DIGEST, found[:12], "the digest of the file's contents; it is damaged"))
     others = [
-        Fault(str(path), "--restart", f"a file of another {name}", expected)
+        Fault(str(path), "restart", f"a file of another {name}", expected, True)
         for name, mark in owner.items()
         if str(stored.pop(name, "")) != mark
     ]

@@ -6,7 +6,7 @@ import copy
 import hashlib
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -16,8 +16,13 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, PrivateAttr, Validat
 from graben.errors import BadInput, Fault, Refused
 from graben.schemas.quantities import Integer, key
 from graben.schemas.reading import parse_toml, read_toml
+from graben.schemas.toml_text import toml_text, toml_value
 
 Fidelity = Literal["draft", "standard", "reference"]
+
+
+_SETTING = "# graben set: "
+"""Begins each line on top of a scene's text that notes an override."""
 
 
 class Model(BaseModel):
@@ -42,8 +47,8 @@ class Source:
 
     @property
     def effective_text(self) -> str:
-        """The scene's text with the overrides of the command line noted as comments on top."""
-        return "".join(f"# --set {o}\n" for o in self.overrides) + self.text
+        """The scene's text with the overrides of the call noted as comments on top."""
+        return "".join(f"{_SETTING}{o}\n" for o in self.overrides) + self.text
 
     @property
     def sha256(self) -> str:
@@ -74,7 +79,7 @@ class Scene(Model):
     @property
     def source(self) -> Source:
         if self._source is None:
-            raise RuntimeError("this scene was not loaded from a file")
+            raise RuntimeError("this scene was not made by load_scene")
         return self._source
 
 
@@ -90,14 +95,25 @@ InputFile = Annotated[Path, AfterValidator(_existing_file)]
 """A path in a scene, relative to the scene's own folder; it must exist when the scene is loaded."""
 
 
-def load_scene(path: str | Path, kind: str | Iterable[str], overrides: Iterable[str] = ()) -> Any:
-    """Read and check a scene file.
+Given = str | Path | Mapping[str, Any] | Scene
+"""A scene as a caller gives it: a TOML file, tables with the same keys, or one that is checked already."""
+
+Overrides = Iterable[str] | Mapping[str, Any]
+"""Settings ``"table.key=value"``, or values by dotted key."""
+
+UNNAMED = Path("(scene)")
+"""What messages call a scene that lies in no file."""
+
+
+def load_scene(given: Given, kind: str | Iterable[str], overrides: Overrides = (), name: Path = UNNAMED) -> Any:
+    """Read and check a scene.
 
     Parameters
     ----------
-    path : the TOML file
+    given : a TOML file, or tables; paths in tables are relative to the working directory
     kind : the kind, or kinds, of scene that the caller takes
-    overrides : ``"table.key=value"`` settings that replace keys of the file
+    overrides : ``"table.key=value"`` settings, or values by dotted key, that replace keys of the scene
+    name : what messages call tables
 
     Returns
     -------
@@ -105,15 +121,26 @@ def load_scene(path: str | Path, kind: str | Iterable[str], overrides: Iterable[
 
     Raises
     ------
-    BadInput : every fault of the file at once
+    BadInput : every fault of the scene at once
     """
     from graben.schemas.kinds import SCENES, scene_model
 
-    path = Path(path)
     kinds = [kind] if isinstance(kind, str) else list(kind)
-    text, tables = read_toml(path, "scene file")
-    overrides = tuple(overrides)
-    for setting in overrides:
+    settings = _settings(overrides)
+    if isinstance(given, Scene):
+        if not settings and getattr(given, "kind", None) in kinds:
+            return given
+        path, text, settings = given.source.path, given.source.text, (*given.source.overrides, *settings)
+        tables = parse_toml(text)
+    elif isinstance(given, Mapping):
+        tables = parse_toml(_text_of(given, name))
+        for setting in settings:
+            _override(tables, setting)
+        path, text, settings = name, _text_of(tables, name), ()
+    else:
+        path = Path(given)
+        text, tables = read_toml(path, "scene file")
+    for setting in settings:
         _override(tables, setting)
     found = tables.get("kind")
     if not isinstance(found, str) or found not in SCENES or found not in kinds:
@@ -124,8 +151,34 @@ def load_scene(path: str | Path, kind: str | Iterable[str], overrides: Iterable[
         scene = model.model_validate(tables, context={"folder": path.resolve().parent})
     except ValidationError as error:
         raise BadInput(_faults(str(path), error)) from None
-    scene._source = Source(path, text, overrides)
+    scene._source = Source(path, text, settings)
     return scene
+
+
+def effective_tables(effective_text: str) -> dict[str, Any]:
+    """The tables of a scene's text as run, with its overrides in place."""
+    tables = parse_toml(effective_text)
+    for line in effective_text.splitlines():
+        if not line.startswith(_SETTING):
+            break
+        _override(tables, line.removeprefix(_SETTING))
+    return tables
+
+
+def _settings(overrides: Overrides) -> tuple[str, ...]:
+    if not isinstance(overrides, Mapping):
+        return tuple(overrides)
+    try:
+        return tuple(f"{name}={toml_value(value)}" for name, value in overrides.items())
+    except Refused as error:
+        raise BadInput(Fault("", "set", "", str(error), True)) from None
+
+
+def _text_of(tables: Mapping[str, Any], name: Path) -> str:
+    try:
+        return toml_text(tables)
+    except Refused as error:
+        raise BadInput(Fault(str(name), "", "", str(error))) from None
 
 
 _NO_SETTING = re.compile("[\\x00-\\x08\\x0a-\\x1f\\x7f\\ud800-\\udfff]")
@@ -137,7 +190,7 @@ def _override(tables: dict[str, Any], setting: str) -> None:
     parts = name.strip().split(".")
     if not equals or not all(parts) or len(parts) > 16 or _NO_SETTING.search(setting):
         expected = "KEY=VALUE with a dotted key, such as seed=3, in one line of text"
-        raise BadInput(Fault("--set", _shown(setting), "", expected))
+        raise BadInput(Fault("", "set", _shown(setting), expected, True))
     try:
         value = parse_toml(f"v = {raw}")["v"]
     except ValueError:
@@ -146,7 +199,7 @@ def _override(tables: dict[str, Any], setting: str) -> None:
     for part in parts[:-1]:
         table = table.setdefault(part, {})
         if not isinstance(table, dict):
-            raise BadInput(Fault("--set", name, _shown(raw), f"a table at {part}"))
+            raise BadInput(Fault("", "set", _shown(setting), f"a table at {part}", True))
     table[parts[-1]] = copy.deepcopy(value)
 
 

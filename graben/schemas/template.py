@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import enum
 import json
 import textwrap
-from pathlib import Path
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
@@ -13,6 +11,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from graben.schemas.kinds import scene_model
+from graben.schemas.toml_text import toml_value
 
 
 def json_schema(kind: str) -> str:
@@ -54,7 +53,7 @@ def _table(model: type[BaseModel], prefix: str, skip: tuple[str, ...] = ()) -> l
         elif value is None:
             plain += [*_comment(info), f"# {name} = ..."]
         else:
-            plain += [*_comment(info), f"{name} = {_toml(value)}"]
+            plain += [*_comment(info), f"{name} = {toml_value(value)}"]
     return plain + tables
 
 
@@ -65,7 +64,7 @@ def _named_table(model: type[BaseModel], name: str) -> list[str]:
 def _given(values: dict[str, Any] | BaseModel) -> list[str]:
     if isinstance(values, BaseModel):
         values = values.model_dump(exclude_defaults=False)
-    return [f"{k} = {_toml(v)}" for k, v in values.items() if v is not None]
+    return [f"{k} = {toml_value(v)}" for k, v in values.items() if v is not None]
 
 
 def _inner_model(info: FieldInfo) -> type[BaseModel] | None:
@@ -121,21 +120,3 @@ def _choices(annotation: Any) -> tuple[Any, ...]:
         if found:
             return found
     return ()
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, enum.Enum):
-        return _toml(value.value)
-    if isinstance(value, str | Path):
-        return json.dumps(str(value), ensure_ascii=False)
-    if isinstance(value, int | float):
-        return repr(value)
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_toml(v) for v in value) + "]"
-    if isinstance(value, BaseModel):
-        value = value.model_dump()
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in value.items() if v is not None) + " }"
-    raise TypeError(f"no TOML for {type(value).__name__}")

@@ -32,13 +32,16 @@ class Run:
         low, high = self.history.domain.min(axis=0), self.history.domain.max(axis=0)
         return float(low[0] + high[0]) / 2.0, float(low[1] + high[1]) / 2.0
 
-    def refuse_outside(self, rev: Rev, key: str, state: int = 0) -> list[Fault]:
-        """A fault where a region reaches beyond the model at a saved state by over a thousandth of its radius."""
+    def refuse_outside(self, rev: Rev, key: str, state: int = 0, *, argument: bool = False) -> list[Fault]:
+        """A fault where a region reaches beyond the model at a saved state by over a thousandth of its radius.
+
+        key : of the scene, or an argument of the call, that gave the region
+        """
         h = self.history
         domain = domain_outline(h.network, h.current[state]) if state else h.domain
         beyond = rev.outside_by(domain)
         if beyond <= 1e-3 * rev.radius:
-            return self._refuse_removed(rev, key)
+            return self._refuse_removed(rev, key, argument)
         shape = "circle" if isinstance(rev, Circle) else "polygon"
         x, y = rev.centre
         low, high = domain.min(axis=0), domain.max(axis=0)
@@ -47,9 +50,9 @@ class Run:
             f"a REV inside the model, which spans {low[0]:g} to {high[0]:g} m by {low[1]:g} to {high[1]:g} m; "
             f"it reaches {beyond:g} m beyond"
         )
-        return [Fault(str(self.path), key, value, expected)]
+        return [Fault(str(self.path), key, value, expected, argument)]
 
-    def _refuse_removed(self, rev: Rev, key: str) -> list[Fault]:
+    def _refuse_removed(self, rev: Rev, key: str, argument: bool) -> list[Fault]:
         """A fault where a region meets blocks that are taken out: their strain is not known."""
         network = self.history.network
         meets = rev.crossed(network, network.position) | rev.contains(network.interior)
@@ -57,7 +60,7 @@ class Run:
             return []
         x, y = rev.centre
         value = f"radius {rev.radius:g} m at ({x:g}, {y:g}) m"
-        return [Fault(str(self.path), key, value, "a REV clear of blocks that are taken out")]
+        return [Fault(str(self.path), key, value, "a REV clear of blocks that are taken out", argument)]
 
 
 def read_run(path: Path) -> Run:

@@ -168,7 +168,7 @@ def _bring_back(
         test.bring_back(parts["test"])
         history.bring_back(parts["history"])
     except Refused as error:
-        raise BadInput(Fault(str(path), "--restart", "", f"a checkpoint of this model ({error})")) from error
+        raise BadInput(Fault(str(path), "restart", "", f"a checkpoint of this model ({error})", True)) from error
 
 
 def _model(scene: BlocksScene, tessellation: Tessellation, dt: float, gravity: tuple[float, float]) -> BlockModel:

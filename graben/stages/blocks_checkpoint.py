@@ -1,4 +1,4 @@
-"""Checkpoints of a run of blocks: NAME.checkpoint.npz beside the output, from which --restart goes on."""
+"""Checkpoints of a run of blocks: NAME.checkpoint.npz beside the output, from which a restart goes on."""
 
 from __future__ import annotations
 
@@ -84,9 +84,9 @@ def read(output: Path, scene: Scene) -> dict[str, Arrays]:
     """
     path = path_for(output)
     if not path.is_file():
-        raise BadInput(Fault(str(path), "--restart", "", "a checkpoint, as an interrupted run leaves it"))
+        raise BadInput(Fault(str(path), "restart", "", "a checkpoint, as an interrupted run leaves it", True))
     parts: dict[str, Arrays] = {"model": {}, "test": {}, "history": {}}
-    for name, values in read_saved(path, _marks(scene), "that of the same scene, --set and version").items():
+    for name, values in read_saved(path, _marks(scene), "that of the same scene, settings and version").items():
         part, _, rest = name.partition(".")
         if part in parts:
             parts[part][rest] = values

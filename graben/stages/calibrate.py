@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from graben.mechanics.search.identifiability import identify
 from graben.schemas.files import together
 from graben.schemas.layouts.calibration import LAYOUT
 from graben.schemas.outputs import MATERIAL, PARTIAL, STATE, Outputs, beside, files_of
-from graben.schemas.scene import load_scene
+from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.material import material_text, write_material
 from graben.stages.calibrate_compare import Candidate, cross_validate, label, rivals
@@ -61,14 +61,14 @@ def prepare(
     Raises
     ------
     BadInput : the scene, a curve or a rival has faults, or the search would be too large
-    Incomplete : no other fault than that the command line must name the curves
+    Incomplete : no other fault than that the call must name the curves
     """
     file, names = scene.source.path, list[str]()
     problem = problem_of(scene, file, label(file, names), threads)
     others = rivals(compare, scene, names, threads)
     sources = [Path(p) for p in (curves or scene.curves)]
     if not sources:
-        expected = "at least one file of curves, here or on the command line"
+        expected = "at least one file of curves, here or in the call"
         raise Incomplete(Fault(str(file), "curves", "[]", expected))
     reading = Reading(scene.test, scene.csv.sign, scene.csv.allow_tension, scene.csv.allow_narrowing)
     files = read_files([*sources, *validate], reading)
@@ -87,7 +87,7 @@ def prepare(
 
 @keeps_last_good("no start of the search had finished yet")
 def run(
-    scene_path: Path,
+    given: Given,
     output: Path,
     *,
     curves: Sequence[Path] = (),
@@ -95,7 +95,7 @@ def run(
     compare: Sequence[Path] = (),
     cluster: str | None = None,
     restart: bool = False,
-    overrides: Iterable[str] = (),
+    overrides: Overrides = (),
     overwrite: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def run(
     ------
     BadInput : the scene or a curve has faults, or an output exists
     """
-    scene: CalibrateScene = load_scene(scene_path, "calibrate", overrides)
+    scene: CalibrateScene = load_scene(given, "calibrate", overrides)
     outputs = Outputs(output, (MATERIAL,), kept=(STATE, PARTIAL))
     read = [*files_of(scene), *curves, *validate, *compare]
     outputs.claim(read, overwrite=overwrite, restart=restart)

@@ -39,7 +39,7 @@ class State:
         """Take up what an interrupted run left; without a file nothing was left. BadInput where it does not fit."""
         if not self.path.is_file():
             return
-        expected = "that of the same scene, curves and version; without --restart it is begun anew"
+        expected = "that of the same scene, curves and version; without `restart` it is begun anew"
         tables = read_saved(self.path, {"digest": self.digest}, expected)
         for name in tables:
             if name.endswith("|members"):

@@ -10,7 +10,7 @@ from typing import Any
 from graben.errors import BadInput, Fault, Incomplete
 from graben.schemas.artifact import PARTIAL, check_artifact
 from graben.schemas.kinds import SCENES
-from graben.schemas.scene import load_scene
+from graben.schemas.scene import Given, load_scene
 
 # Kind of scene -> the stage whose prepare(scene) makes every check before its work.
 _STAGES = {
@@ -24,15 +24,18 @@ _STAGES = {
 }
 
 
-def check(path: str | Path) -> list[Fault]:
-    """Every fault of a scene or material file (.toml) or an artifact (.nc); empty when there is none."""
-    return examine(path)[0]
+def check(given: Given) -> list[Fault]:
+    """Every fault of a scene, of a material file (.toml) or of an artifact (.nc); empty when there is none."""
+    return examine(given)[0]
 
 
-def examine(path: str | Path) -> tuple[list[Fault], list[Fault]]:
-    """Faults of a file, and what its stage needs beside it on the command line."""
-    path = Path(path)
+def examine(given: Given) -> tuple[list[Fault], list[Fault]]:
+    """Faults of a scene or a file, and what its stage needs beside it in the call."""
     try:
+        if not isinstance(given, str | Path):
+            _scene(given)
+            return [], []
+        path = Path(given)
         if path.suffix == ".nc":
             return _artifact(path), []
         if path.suffix != ".toml":
@@ -51,7 +54,11 @@ def _toml(path: Path) -> None:
 
         pack_material(path, path)
         return
-    scene = load_scene(path, tuple(SCENES))
+    _scene(path)
+
+
+def _scene(given: Given) -> None:
+    scene = load_scene(given, tuple(SCENES))
     import_module(f"graben.stages.{_STAGES[scene.kind]}").prepare(scene)
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from graben.schemas.scene import Source, load_scene
+from graben.schemas.scene import load_scene
 
 
 def default_scene(kind: str, overrides: Iterable[str] = ()) -> Any:
@@ -17,9 +16,4 @@ def default_scene(kind: str, overrides: Iterable[str] = ()) -> Any:
     ------
     BadInput : faults of the overrides
     """
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "defaults.toml"
-        path.write_text(f'kind = "{kind}"\n', encoding="utf-8")
-        scene = load_scene(path, kind, overrides)
-    scene._source = Source(Path(f"(defaults of {kind})"), scene.source.text, scene.source.overrides)
-    return scene
+    return load_scene({"kind": kind}, kind, overrides, name=Path(f"(defaults of {kind})"))

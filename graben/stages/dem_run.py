@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from graben.errors import BadInput, Fault
 from graben.schemas.outputs import files_of
-from graben.schemas.scene import load_scene
+from graben.schemas.scene import Given, Overrides, load_scene
 from graben.stages.record import Progress, silent
 
 
 def run(
-    scene_path: Path,
+    given: Given,
     output: Path,
     *,
-    overrides: Iterable[str] = (),
+    overrides: Overrides = (),
     overwrite: bool = False,
     restart: bool = False,
     progress: Progress = silent,
@@ -31,11 +30,13 @@ def run(
     BadInput : the scene has faults, or the output exists
     NumericsFailed : the run had to stop; the last good state is kept beside the output
     """
-    scene = load_scene(scene_path, ("blocks", "particles"), overrides)
+    scene = load_scene(given, ("blocks", "particles"), overrides)
     stage = import_module(f"graben.stages.{scene.kind}")
     stage.outputs_of(scene, output).claim(files_of(scene), overwrite=overwrite, restart=restart)
     if not restart:
         return stage.run(scene, output, progress=progress)
     if scene.kind != "blocks":
-        raise BadInput(Fault(str(scene_path), "--restart", "", 'a scene of kind "blocks"; others start anew'))
+        raise BadInput(
+            Fault(str(scene.source.path), "restart", "", 'a scene of kind "blocks"; others start anew', True)
+        )
     return stage.run(scene, output, restart=True, progress=progress)

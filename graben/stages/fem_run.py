@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from graben.mechanics.continuum.newton import NewtonOptions, Step
 from graben.mechanics.continuum.quads import body_force, edge_traction
 from graben.mechanics.continuum.stability import softest_stiffness
 from graben.schemas.outputs import LAST_GOOD, SERIES, Outputs, beside, files_of
-from graben.schemas.scene import load_scene
+from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.fem import FemScene
 from graben.stages.estimate import Estimate, refuse_too_large
 from graben.stages.fem_mesh import mesh_of
@@ -62,11 +61,11 @@ class Problem:
 
 @keeps_last_good("no step had been accepted yet")
 def run(
-    scene_path: Path,
+    given: Given,
     output: Path,
     *,
     material: Path | None = None,
-    overrides: Iterable[str] = (),
+    overrides: Overrides = (),
     overwrite: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
@@ -88,7 +87,7 @@ def run(
     BadInput : the scene, the mesh or the material has faults, or the output exists
     NumericsFailed : no equilibrium under gravity, or before the end where the goal is the end
     """
-    scene: FemScene = load_scene(scene_path, "fem", overrides)
+    scene: FemScene = load_scene(given, "fem", overrides)
     last_good = beside(output, LAST_GOOD + ".nc")
     kept = (LAST_GOOD + ".nc", *(LAST_GOOD + end for end in SERIES))
     Outputs(output, SERIES, kept=kept).claim([*files_of(scene), material], overwrite=overwrite)

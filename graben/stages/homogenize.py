@@ -79,14 +79,15 @@ def run(
     BadInput : faults of the inputs, a REV outside the model, an output that exists
     """
     if bool(radii) == bool(polygon):
-        raise BadInput(Fault("homogenize", "--radius, --polygon", "", "either a radius or a polygon"))
+        raise BadInput(Fault("homogenize", "radius", "", "either a `radius` or a `polygon`", True))
     pictures = () if steps_picture is None else (steps_picture,)
     Outputs(output, SERIES if vtk else (), others=pictures).claim(inputs, overwrite=overwrite)
     kinds = [kind_of(path) for path in _existing(inputs)]
     if "particles" in kinds:
-        return _spheres(inputs, kinds, output, radii, centre, deformed, chosen_at, steps_picture or vtk, progress)
+        drawn = "steps" if steps_picture is not None else "vtk" if vtk else ""
+        return _spheres(inputs, kinds, output, radii, centre, deformed, chosen_at, drawn, progress)
     if centre is not None and len(centre) != 2:
-        raise BadInput(Fault("homogenize", "--centre", f"{len(centre)} lengths", "x, y for blocks"))
+        raise BadInput(Fault("homogenize", "centre", f"{len(centre)} lengths", "x, y for blocks", True))
     record = Record.begin(None, inputs=inputs)
     jobs, faults = _jobs(inputs, radii, centre, polygon, chosen_at, progress)
     if faults:
@@ -142,7 +143,7 @@ def _spheres(
     centre: Sequence[float] | None,
     deformed: bool,
     chosen_at: int,
-    pictures: Any,
+    pictures: str,
     progress: Progress,
 ) -> dict[str, Any]:
     from graben.stages import homogenize_spheres
@@ -153,12 +154,13 @@ def _spheres(
         if kind != "particles"
     ]
     if not radii:
-        faults.append(Fault("homogenize", "--polygon", "", "a radius: spheres are averaged over balls"))
+        faults.append(Fault("homogenize", "polygon", "", "a `radius`: spheres are averaged over balls", True))
     if deformed or pictures:
-        option = "--deformed" if deformed else "--steps, --vtk"
-        faults.append(Fault("homogenize", option, "", "blocks: spheres have no outline, and a ball goes with them"))
+        name = "deformed" if deformed else pictures
+        expected = "blocks: spheres have no outline, and a ball goes with them"
+        faults.append(Fault("homogenize", name, "", expected, True))
     if centre is not None and len(centre) != 3:
-        faults.append(Fault("homogenize", "--centre", f"{len(centre)} lengths", "x, y, z for spheres"))
+        faults.append(Fault("homogenize", "centre", f"{len(centre)} lengths", "x, y, z for spheres", True))
     if faults:
         raise BadInput(faults)
     return homogenize_spheres.run(inputs, output, radii=radii, centre=centre, chosen_at=chosen_at, progress=progress)
@@ -191,16 +193,17 @@ def _jobs(
             continue
         states = source.history.time.size
         if not 0 <= chosen_at < states:
-            faults.append(Fault(str(path), "--chosen-at", str(chosen_at), f"a saved state, 0 to {states - 1}"))
+            expected = f"a saved state, 0 to {states - 1}"
+            faults.append(Fault(str(path), "chosen_at", str(chosen_at), expected, True))
             continue
         try:
             revs: list[Rev] = [Circle((centre[0], centre[1]) if centre else source.middle, r) for r in radii]
             if polygon:
                 revs.append(Polygon(tuple(polygon)))
         except Refused as error:
-            return [], [Fault("homogenize", "--radius" if radii else "--polygon", "", str(error))]
+            return [], [Fault("homogenize", "radius" if radii else "polygon", "", str(error), True)]
         for rev in revs:
-            faults += source.refuse_outside(rev, "--radius" if radii else "--polygon", chosen_at)
+            faults += source.refuse_outside(rev, "radius" if radii else "polygon", chosen_at, argument=True)
             jobs.append((source, rev))
     return jobs, faults
 

@@ -80,7 +80,7 @@ def run(
     for bed in beds:
         if not 0 <= chosen_at < bed.time.size:
             expected = f"a step of the curve, 0 to {bed.time.size - 1} (0 is the first state with contacts)"
-            faults.append(Fault(str(bed.path), "--chosen-at", str(chosen_at), expected))
+            faults.append(Fault(str(bed.path), "chosen_at", str(chosen_at), expected, True))
         else:
             faults += [f for r in radii for f in _ball_faults(bed, r, _middle(bed, centre), chosen_at)]
     if faults:
@@ -208,12 +208,13 @@ def _ball_faults(bed: _Bed, radius: float, centre: Floats, chosen_at: int) -> li
     if not bed.periodic:
         beyond = beyond or bool((low[:2] < 0.0).any() or (high[:2] > bed.width).any())
     if beyond:
-        return [Fault(str(bed.path), "--radius", found, expected)]
+        return [Fault(str(bed.path), "radius", found, expected, True)]
     offset = bed.position[chosen_at] - centre
     _nearest(offset, bed)
     count = int((np.einsum("ij,ij->i", offset, offset) <= radius**2).sum())
     if count < _FEWEST:
-        return [Fault(str(bed.path), "--radius", found, f"a ball with {_FEWEST} spheres at least; it has {count}")]
+        expected = f"a ball with {_FEWEST} spheres at least; it has {count}"
+        return [Fault(str(bed.path), "radius", found, expected, True)]
     return []
 
 

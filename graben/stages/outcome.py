@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import errno
+import re
+from dataclasses import replace
 
-from graben.errors import BadInput, MachineFailed, NotFinite, NumericsFailed
+from graben.errors import BadInput, Fault, MachineFailed, NotFinite, NumericsFailed
 
 DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
 # What the operating system says when the machine is at fault, not the program.
@@ -14,10 +16,23 @@ _MACHINE = {
 }  # fmt: skip
 
 
+def as_options(fault: Fault) -> Fault:
+    """The fault with arguments of the call spelled as options: chosen_at is --chosen-at."""
+    key = _option(fault.key) if fault.argument else fault.key
+    return replace(fault, key=key, expected=re.sub("`([a-z_]+)`", lambda m: _option(m[1]), fault.expected))
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
+
+
 def explain(error: BaseException) -> tuple[int, list[str]] | None:
-    """Exit code and one line per fault for the errors a user can act on; None for a fault of the program."""
+    """Exit code and one line per fault for the errors a user can act on; None for a fault of the program.
+
+    Arguments of the call are shown as options of the command line.
+    """
     if isinstance(error, BadInput):
-        return BAD_INPUT, [str(fault) for fault in error.faults]
+        return BAD_INPUT, [str(as_options(fault)) for fault in error.faults]
     if isinstance(error, NumericsFailed | NotFinite):
         return FAILED, [f"the numerics failed: {error}", *getattr(error, "__notes__", [])]
     if isinstance(error, MachineFailed):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from graben.mechanics.continuum.scratch.mesh import HexMesh, cells_along, specim
 from graben.mechanics.materials.law import Law
 from graben.mechanics.materials.laws import LAWS
 from graben.schemas.outputs import LAST_GOOD, PARTIAL, SERIES, Outputs, files_of
-from graben.schemas.scene import load_scene
+from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.scratch import ScratchScene
 from graben.stages.estimate import Estimate, refuse_too_large, work
 from graben.stages.last_good import keep_by, keeps_last_good
@@ -31,11 +30,11 @@ _STATE_BYTES = 400.0
 
 @keeps_last_good("the tip had not moved yet")
 def run(
-    scene_path: Path,
+    given: Given,
     output: Path,
     *,
     material: Path | None = None,
-    overrides: Iterable[str] = (),
+    overrides: Overrides = (),
     overwrite: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
@@ -56,7 +55,7 @@ def run(
     BadInput : the scene or the material has faults, or the output exists
     NumericsFailed : energy, volume or mass error beyond the scene's limits; the last good state is kept as VTU
     """
-    scene: ScratchScene = load_scene(scene_path, "scratch", overrides)
+    scene: ScratchScene = load_scene(given, "scratch", overrides)
     outputs = Outputs(output, SERIES, kept=(LAST_GOOD + ".vtu", PARTIAL))
     outputs.claim([*files_of(scene), material], overwrite=overwrite)
     law, par, inputs, _ = prepare(scene, material)

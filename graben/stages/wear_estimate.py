@@ -15,7 +15,7 @@ from graben.mechanics.wear.rate import GrooveTable, balanced_forces, carried_loa
 from graben.schemas.artifact import read_artifact
 from graben.schemas.layouts.wear import LAYOUT
 from graben.schemas.outputs import Outputs, files_of
-from graben.schemas.scene import load_scene
+from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.wear import Mixture, WearScene
 from graben.stages.last_good import keeps_last_good, write_whole
 from graben.stages.record import Progress, Record, silent
@@ -44,12 +44,12 @@ class _BedCounts:
 
 @keeps_last_good("no mixture had been rated yet")
 def run(
-    scene_path: Path,
+    given: Given,
     output: Path,
     *,
     bed: Path | None = None,
     scratch: Mapping[str, Iterable[Path]] | None = None,
-    overrides: Iterable[str] = (),
+    overrides: Overrides = (),
     overwrite: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
@@ -66,7 +66,7 @@ def run(
     ------
     BadInput : every fault of scene and artifacts at once, or the output exists
     """
-    scene: WearScene = load_scene(scene_path, "wear", overrides)
+    scene: WearScene = load_scene(given, "wear", overrides)
     scratch = {name: list(paths) for name, paths in (scratch or {}).items()}
     grooves = [path for paths in scratch.values() for path in paths]
     Outputs(output).claim([*files_of(scene), bed, *grooves], overwrite=overwrite)
@@ -118,7 +118,7 @@ def prepare(
     Raises
     ------
     BadInput : every fault of scene and artifacts at once
-    Incomplete : no other fault than that the command line must name a bed or scratches
+    Incomplete : no other fault than that the call must name a bed or scratches
     """
     file = str(scene.source.path)
     bed_file = bed or (scene.counts.bed if scene.counts.source == "bed" else None)
@@ -126,16 +126,16 @@ def prepare(
     faults: list[Fault] = []
     for name, paths in (scratch or {}).items():
         if name not in files:
-            faults.append(Fault("--scratch", name, "", f"a class of the scene: {', '.join(files)}"))
+            faults.append(Fault(file, "scratch", repr(name), f"a class of the scene: {', '.join(files)}", True))
         else:
             files[name] += list(paths)
     counted = _read_bed(scene, bed_file, faults) if bed_file is not None else None
     known = {g.name: _grooves(scene, g.name, files[g.name], faults) for g in scene.grains}
     absent: list[Fault] = []
     if bed_file is None and scene.counts.source == "bed":
-        absent.append(Fault(file, "counts.bed", "(absent)", "a particles artifact, or --bed FILE"))
+        absent.append(Fault(file, "counts.bed", "(absent)", "a particles artifact, here or as `bed`"))
     if bed_file is None and scene.load.split == "bed":
-        absent.append(Fault(file, "load.split", "'bed'", "a bed to take it from (--bed FILE)"))
+        absent.append(Fault(file, "load.split", "'bed'", "a bed to take it from (`bed`)"))
     _check_grooves(scene, known, faults, absent)
     if faults:
         raise BadInput(faults + absent)
@@ -230,11 +230,11 @@ def _check_grooves(
                     file,
                     f"grains {name!r} grooves",
                     str(found),
-                    "exactly one (load.mode is given), or --scratch NAME=FILE",
+                    "exactly one (load.mode is given), here or as `scratch`",
                 )
             )
     if scene.load.mode == "balanced" and not any(known[name] for name in used):
-        absent.append(Fault(file, "grains grooves", "none", "one groove at least, or --scratch NAME=FILE"))
+        absent.append(Fault(file, "grains grooves", "none", "one groove at least, here or as `scratch`"))
 
 
 def _table(scene: WearScene, name: str, known: dict[str, list[_Known]]) -> GrooveTable:

@@ -155,19 +155,18 @@ def connect(address: str, patience_s: float) -> Client:
         from distributed import Client
     except ModuleNotFoundError as error:
         expected = "Dask on this machine: pip install 'graben[cluster]'"
-        raise BadInput(Fault("--cluster", "", address, f"{expected} ({error})")) from None
+        raise BadInput(Fault("", "cluster", address, f"{expected} ({error})", True)) from None
     try:
         # As a default, Dask would send every computation of this process there, and go on when the client is gone.
         return Client(address, timeout=patience_s, set_as_default=False)
     except (OSError, ValueError) as error:
         expected = f'the address of a Dask scheduler, such as "tcp://10.0.0.1:8786" ({error})'
-        raise BadInput(Fault("--cluster", "", address, expected)) from None
+        raise BadInput(Fault("", "cluster", address, expected, True)) from None
 
 
 def await_worker(client: Client, address: str, patience_s: float) -> None:
     try:
         client.wait_for_workers(1, timeout=patience_s)
     except (TimeoutError, OSError):
-        raise BadInput(
-            Fault("--cluster", "", address, f"a cluster with workers (none for {patience_s:g} s)")
-        ) from None
+        expected = f"a cluster with workers (none for {patience_s:g} s)"
+        raise BadInput(Fault("", "cluster", address, expected, True)) from None

@@ -69,7 +69,7 @@ def test_a_free_place_is_taken_and_nothing_left_there(tmp_path):
 def test_what_the_user_has_there_is_refused(end, overwrite, tmp_path):
     (tmp_path / f"k{end}").write_text("precious")
     said = refused(Outputs(tmp_path / "k.nc", (*SERIES, MATERIAL), (CHECKPOINT,)), overwrite=overwrite)
-    assert f"k{end}" in said and ("graben wrote" if overwrite else "--overwrite") in said
+    assert f"k{end}" in said and ("graben wrote" if overwrite else "`overwrite`") in said
 
 
 @pytest.mark.parametrize("content", ["notes.txt", "0000.vtu.bak", "0001.vtu/x"])
@@ -184,7 +184,7 @@ def test_a_folder_that_cannot_be_written_is_the_machines_fault():
 def test_what_a_stopped_run_kept_may_be_replaced_by_its_restart(tmp_path):
     outputs = Outputs(tmp_path / "a.nc", (), (CHECKPOINT,))
     np.savez(tmp_path / "a.checkpoint.npz", scene=np.array("digest"), x=np.arange(3))
-    assert "--restart" in refused(outputs)
+    assert "`restart`" in refused(outputs)
     outputs.claim([], restart=True)
     outputs.claim([], overwrite=True)
     whole = (tmp_path / "a.checkpoint.npz").read_bytes()

@@ -95,7 +95,7 @@ def test_overrides_replace_keys_and_are_noted_in_the_text(scene_file):
     path = scene_file(template("blocks"))
     scene = load_scene(path, "blocks", ["seed=7", "title=wide beds", "fidelity=draft"])
     assert (scene.seed, scene.title, scene.fidelity) == (7, "wide beds", "draft")
-    assert scene.source.effective_text.startswith("# --set seed=7\n")
+    assert scene.source.effective_text.startswith("# graben set: seed=7\n")
     with pytest.raises(BadInput, match="KEY=VALUE"):
         load_scene(path, "blocks", ["seed"])
     with pytest.raises(BadInput, match="no such key"):

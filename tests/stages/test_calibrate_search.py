@@ -86,10 +86,10 @@ def test_the_state_of_another_scene_is_refused(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         calibrate.run(SCENE, tmp_path / "o.nc", overrides=QUICK, progress=stop)
-    with pytest.raises(BadInput, match="--restart"):
+    with pytest.raises(BadInput, match=": restart"):
         calibrate.run(SCENE, tmp_path / "o.nc", overrides=[*QUICK, "seed=7"], restart=True)
     (tmp_path / "o.state.npz").write_bytes(b"torn")
-    with pytest.raises(BadInput, match="--restart"):
+    with pytest.raises(BadInput, match=": restart"):
         calibrate.run(SCENE, tmp_path / "o.nc", overrides=QUICK, restart=True)
     assert (tmp_path / "o.state.npz").read_bytes() == b"torn"
 
@@ -189,7 +189,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bits(cluster, method, tmp_
 
 def test_no_cluster_is_a_fault(tmp_path, monkeypatch):
     monkeypatch.setattr("graben.stages.calibrate_workers.PATIENCE_S", 1.0)
-    with pytest.raises(BadInput, match="--cluster"):
+    with pytest.raises(BadInput, match=r"^cluster"):
         calibrate.run(SCENE, tmp_path / "o.nc", overrides=QUICK, cluster="tcp://127.0.0.1:9")
 
 

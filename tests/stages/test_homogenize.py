@@ -162,7 +162,7 @@ def test_every_fault_is_named_and_nothing_written(folder, tmp_path):
         homogenize.run([folder / "dem0.nc"], out, polygon=[(1, 1), (2, 2), (2, 1), (1, 2)])
     with pytest.raises(BadInput, match="saved state"):
         homogenize.run([folder / "dem0.nc"], out, radii=[1.0], chosen_at=40)
-    with pytest.raises(BadInput, match="either a radius"):
+    with pytest.raises(BadInput, match="either a `radius`"):
         homogenize.run([folder / "dem0.nc"], out)
     with pytest.raises(BadInput, match="existing artifact"):
         homogenize.run([folder / "none.nc"], out, radii=[1.0])

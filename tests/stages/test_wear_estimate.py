@@ -175,7 +175,7 @@ def test_beds_that_do_not_fit(one, tmp_path, bed, words):
         (["counts.source=guess"], "counts.source"),
         (["counts.source=bed"], "counts.bed"),
         (['counts.bed="no-such.nc"'], "existing file"),
-        (["load.split=bed"], "--bed"),
+        (["load.split=bed"], "`bed`"),
         (['mixtures=[{name="x",shares={D50=1.0}}]'], "D50"),
         (['mixtures=[{name="x",shares={D100=0.7}}]'], "sum 1"),
         (['grains=[{name="D100",diameter="100 um"}]'], "exactly one"),

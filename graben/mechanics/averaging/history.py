@@ -57,7 +57,8 @@ class Contacts:
 
     def point_forces(self, chosen: NDArray[np.bool_]) -> tuple[Ints, Ints, Floats, Floats]:
         """State, blocks, position and force of some contacts (contact,), each as one force at either end."""
-        state, block, position, force = (v[chosen] for v in (self.state, self.block, self.position, self.force))
+        state, block = self.state[chosen], self.block[chosen]
+        position, force = self.position[chosen], self.force[chosen]
         if self.tangent is None or self.moment is None:
             return state, block, position, force
         length = self.length[chosen]
@@ -197,7 +198,7 @@ def average(history: History, rev: Rev, deformed: bool = False, chosen_at: int =
     bare = outline.blocks & ~history.zoned
     if bare.any():
         moment = rigid.force_moment(
-            bare, history.motion[0], *c.point_forces(bare[c.block].any(axis=1)),
+            bare, history.motion[0], *c.point_forces(np.any(bare[c.block], axis=1)),
             history.vertex_block, history.current, history.vertex_force,
         ) / np.broadcast_to(measure, (count,))[:, None, None]  # fmt: skip
         stress[:, 0] += moment[:, 0, 0]

@@ -35,8 +35,8 @@ def balance(model: BlockModel, zone_stress: np.ndarray, boundary_force: np.ndarr
     body = zone_pull(x, b.zone_vertex, zone_stress) - joint - boundary_force
     # First moments of the same joint forces, as vertices and as contacts have them; about a point of each block.
     n = len(b.block_area)
-    middle = np.column_stack([np.bincount(b.vertex_block, c, minlength=n) for c in x.T])
-    middle /= np.bincount(b.vertex_block, minlength=n)[:, None]
+    total = np.column_stack([np.bincount(b.vertex_block, c, minlength=n) for c in x.T])
+    middle = total / np.bincount(b.vertex_block, minlength=n)[:, None]
     moment = np.zeros((n, 2, 2))
     arm = x - middle[b.vertex_block]
     np.add.at(moment, b.vertex_block, joint[:, :, None] * arm[:, None, :])

@@ -146,7 +146,7 @@ def ear_clip(ring: np.ndarray) -> np.ndarray:
             raise Refused("block outline is not a simple counter-clockwise polygon")
         triangles.append((left[best - 1], left[best], left[(best + 1) % len(left)]))
         del left[best]
-    triangles.append(tuple(left))
+    triangles.append((left[0], left[1], left[2]))
     return np.array(triangles)
 
 

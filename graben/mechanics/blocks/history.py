@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from graben.errors import Refused
@@ -88,7 +90,8 @@ class History:
 
     def cut(self, states: int) -> None:
         """Forget all but the first saved states."""
-        for rows in (self.time, self.overlap, self.damping, *self.rows.values()):
+        every: list[list[Any]] = [self.time, self.overlap, self.damping, *self.rows.values()]
+        for rows in every:
             del rows[states:]
 
     def stored(self, states: int) -> dict[str, np.ndarray]:

@@ -141,7 +141,8 @@ def voronoi_blocks(
     for _ in range(lloyd_passes):
         points, start, corner = _cells(seeds, outline)
         _, seeds = polygons.areas_and_centroids(points, start, corner)
-    tessellation = _conforming(*_cells(seeds, outline), outline)
+    points, start, corner = _cells(seeds, outline)
+    tessellation = _conforming(points, start, corner, outline)
     return collapse_short_edges(tessellation, limit)
 
 

@@ -92,14 +92,12 @@ def equilibrate(
     """
     fixed_move = prescribed - old.displacement[body.fixed]
     increment = np.zeros(body.pattern.size)
-    response = None
     if guess is not None:
         increment = guess.copy()
         increment[body.fixed] = fixed_move
         response = body.respond(old, increment, True)
-        if response.failed_point >= 0:
-            response, increment = None, np.zeros(body.pattern.size)
-    if response is None:
+    if guess is None or response.failed_point >= 0:
+        increment = np.zeros(body.pattern.size)
         response = body.respond(old, increment, True)
     residuals: list[float] = []
 

@@ -270,12 +270,11 @@ class Assembly:
             ratio = law.pair_cn / law.pair_kn
             xi = 0.5 * omega * float(ratio.max())
             over = self.dt / (2.0 / omega * (np.sqrt(1.0 + xi * xi) - xi))
-        values = [float(a) for a in out]
-        return (
-            Survey(*values[:6], int(values[6]), *values[7:], step_over_critical=float(over)),
-            floor_force,
-            coordination,
-        )
+        kinetic, spinning, elastic, potential, mean, net, count, overlap, floor, piston, walls = map(float, out)
+        found = Survey(
+            kinetic, spinning, elastic, potential, mean, net, int(count), overlap, floor, piston, walls, float(over),
+        )  # fmt: skip
+        return found, floor_force, coordination
 
     def contacts(self) -> tuple[Ints, Floats, Floats]:
         """Touching pairs as identities (m, 2), unit normals first to second (m, 3), spring forces (m,) N."""

@@ -37,11 +37,11 @@ def cell_order(x, low, size, counts):
         c = np.int64(0)
         for a in range(3):
             k = np.int64((x[i, a] - low[a]) / size[a])
-            k = min(max(k, 0), counts[a] - 1)
+            k = min(max(k, 0), counts[a] - 1)  # type: ignore[arg-type]
             c = c * counts[a] + k
         of[i] = c
         start[c + 1] += 1
-    for c in range(cells):
+    for c in range(cells):  # type: ignore[assignment]
         start[c + 1] += start[c]
     fill = start[:-1].copy()
     order = np.empty(n, np.int64)

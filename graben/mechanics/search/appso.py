@@ -41,7 +41,7 @@ class _Flock:
         self.trails: dict[int, tuple[Array, Array]] = {}
         self.random: dict[int, Array] = {}
 
-    def record(self, group: Array, values: Array) -> None:
+    def record(self, group: NDArray[np.int64], values: Array) -> None:
         """The values of the particles `group` (j,) where they stand."""
         better = values < self.own_values[group]
         self.own[group[better]], self.own_values[group[better]] = self.x[group[better]], values[better]

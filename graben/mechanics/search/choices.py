@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,11 +61,11 @@ def explore(
     starts (j, k): points to begin with. executor and chunk serve "appso", see there; the other methods evaluate
     here.
     """
-    swarming = {
+    swarming: dict[str, Any] = {
         "inertia": plan.inertia, "inertia_reduction": plan.inertia_reduction, "cognitive": plan.cognitive,
         "social": plan.social, "constriction": plan.constriction,
     }  # fmt: skip
-    budget = {"particles": plan.particles, "generations": plan.generations}
+    budget: dict[str, Any] = {"particles": plan.particles, "generations": plan.generations}
     if plan.method == "swarm":
         return swarm(function, size, seed=seed, starts=starts, progress=progress, **budget, **swarming)
     if plan.method == "appso":

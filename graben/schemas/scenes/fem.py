@@ -64,7 +64,7 @@ _SLOPE_SUPPORTS: Any = [
     {"name": "base", "start": ["0 m", "0 m"], "end": ["80 m", "0 m"], "fix": "y"},
 ]
 _SLOPE_LOADS: Any = [{"name": "backslope", "start": ["55 m", "50 m"], "end": ["60 m", "50 m"], "rate": "0.25 MPa/s"}]
-# Y, table 4.2 (damage strains read as percent): a stand-in until a calibrated law is chained by --material FILE.
+# Y, table 4.2 (damage strains read as percent): a stand-in until a calibrated law takes its place.
 _ROCK_MASS: Any = {
     "law": "drucker-prager",
     "parameters": {

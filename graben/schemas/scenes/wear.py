@@ -25,10 +25,12 @@ class Groove(Model):
 class GrainClass(Model):
     """A size of grain."""
 
-    name: Name = key(..., "name of the class; mixtures and --scratch refer to it", min_length=1, examples=["fine"])
+    name: Name = key(
+        ..., "name of the class; mixtures and scratch artifacts refer to it", min_length=1, examples=["fine"]
+    )
     diameter: Length = key(..., "diameter", gt=0, examples=["100 um"])
     grooves: tuple[Groove, ...] = key(
-        (), "grooves by a grain of this size at one force or more; or give --scratch NAME=FILE"
+        (), "grooves by a grain of this size at one force or more; or give scratch artifacts with the command"
     )
     scratch: tuple[InputFile, ...] = key((), "scratch artifacts of a grain of this size")
 
@@ -64,7 +66,7 @@ class Counts(Model):
     """Where the number of contacts comes from."""
 
     source: Literal["graben", "hoormazdi-2021", "bed"] = key(
-        "graben", "a law of contacts per area, or counts in a bed artifact (see --bed)"
+        "graben", "a law of contacts per area, or counts in a bed artifact"
     )
     bed: InputFile | None = key(None, "particles artifact whose floor contacts count (source bed)")
 

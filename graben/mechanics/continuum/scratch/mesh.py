@@ -86,8 +86,7 @@ def brick(x: Floats, y: Floats, z: Floats) -> HexMesh:
     def number(i: Ints, j: Ints, k: Ints) -> Ints:
         return (i * (ny + 1) + j) * (nz + 1) + k
 
-    i, j, k = np.meshgrid(np.arange(nx), np.arange(ny), np.arange(nz), indexing="ij")
-    i, j, k = i.ravel(), j.ravel(), k.ravel()
+    i, j, k = (a.ravel() for a in np.meshgrid(np.arange(nx), np.arange(ny), np.arange(nz), indexing="ij"))
     cells = np.stack([number(i + a, j + b, k + c) for a, b, c in CORNERS], axis=1).astype(np.int64)
     free = np.ones_like(points)
     held = (points[:, 0] == x[0]) | (points[:, 0] == x[-1]) | (points[:, 1] == y[-1]) | (points[:, 2] == z[0])

@@ -1,0 +1,1 @@
+"""What ``import graben`` offers to Python: thin functions over stages and mechanics."""
