@@ -22,6 +22,7 @@ _HOME = {
     "GrabenError": "graben.errors",
     "BadInput": "graben.errors",
     "Fault": "graben.errors",
+    "MachineFailed": "graben.errors",
     "NumericsFailed": "graben.errors",
 }
 
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from graben.errors import BadInput as BadInput
     from graben.errors import Fault as Fault
     from graben.errors import GrabenError as GrabenError
+    from graben.errors import MachineFailed as MachineFailed
     from graben.errors import NumericsFailed as NumericsFailed
 
 __all__ = sorted([*_HOME, "__version__"])

@@ -153,9 +153,10 @@ def test_python_in_the_text_runs(page, tmp_path, monkeypatch):
     """Beside wear.nc, a result that takes a moment."""
     monkeypatch.chdir(tmp_path)
     wear_estimate.run(ROOT / "pipelines/wear/astm-g65-mixtures.toml", tmp_path / "wear.nc")
+    names: dict[str, object] = {}
     for language, text in BLOCK.findall(read(page)):
         if language == "python":
-            exec(compile(text, name(page), "exec"), {})
+            exec(compile(text, name(page), "exec"), names)
 
 
 @pages(MANUAL)
