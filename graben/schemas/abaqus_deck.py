@@ -74,10 +74,7 @@ def read_deck(path: Path) -> tuple[np.ndarray, list[Block], list[str]]:
                     raise BadInput(Fault(str(path), f"element {label}", f"node {node}", "nodes that *Node defines"))
         same = min(len(nodes) for _, nodes in chosen)  # all, where the name is known
         corners = np.array([[row[n] for n in nodes[:same]] for _, nodes in chosen], dtype=np.int64)
-        kind = "line" if _LINE.fullmatch(element_type) else _KINDS.get(element_type, element_type)
-        if element_type == _QUADS_OF_MESHIO and reader.by_meshio:
-            kind = "quad"
-        blocks.append(Block(kind, element_type, corners, np.array([label for label, _ in chosen])))
+        blocks.append(Block(reader.kind(element_type), element_type, corners, np.array([label for label, _ in chosen])))
         if element_type in _OTHER_PLANES:
             notes.append(
                 f"{len(chosen)} {element_type} elements are computed in plane strain, not as their name says"
@@ -112,6 +109,12 @@ class _Reader:
                 place = f"line {where}, *{keyword.capitalize()}"
                 raise BadInput(Fault(str(path), place, "", f"numbers separated by commas ({error})")) from None
 
+    def kind(self, element_type: str) -> str:
+        """The cell that a name means in this deck; the name itself where that is not known."""
+        if element_type == _QUADS_OF_MESHIO and self.by_meshio:
+            return "quad"
+        return "line" if _LINE.fullmatch(element_type) else _KINDS.get(element_type, element_type)
+
     def _take(
         self, keyword: str, options: dict[str, str], rows: list[tuple[list[str], bool]], path: Path, depth: int
     ) -> None:
@@ -133,7 +136,8 @@ class _Reader:
                 rows = [*rows, *_data(_text(beside).splitlines())]
             scope = self.scopes.setdefault(self._scope, _Scope())
             if keyword == "ELEMENT":
-                _elements(scope, options.get("TYPE", "").upper(), rows, path)
+                name = options.get("TYPE", "").upper()
+                _elements(scope, name, _NODES.get(self.kind(name), 0), rows, path)
             elif options.get("SYSTEM", "R").upper() != "R":
                 raise BadInput(Fault(str(path), "*Node", f"system={options['SYSTEM']}", "Cartesian coordinates"))
             else:
@@ -200,9 +204,8 @@ def _nodes(scope: _Scope, rows: list[tuple[list[str], bool]], path: Path) -> Non
         scope.nodes[label] = (x, y, z)
 
 
-def _elements(scope: _Scope, name: str, rows: list[tuple[list[str], bool]], path: Path) -> None:
-    """Take the elements of a section; those of an unknown name end where a line does not end with a comma."""
-    length = _NODES.get(_KINDS.get(name, ""), 0)
+def _elements(scope: _Scope, name: str, length: int, rows: list[tuple[list[str], bool]], path: Path) -> None:
+    """Take the elements of a section, of `length` nodes; 0: each ends where a line does not end with a comma."""
     pending: list[int] = []
     for values, goes_on in rows:
         pending += [int(v) for v in values if v]
