@@ -145,13 +145,19 @@ def say(lines: Iterable[str]) -> None:
     """Lines on stdout. A reader that has gone away has what it wanted; any other refusal is the machine's."""
     try:
         for line in lines:
-            click.echo(line)
+            click.echo(_printable(line))
     except OSError as error:
         _give_up_stdout()
         if not isinstance(error, BrokenPipeError):
             from graben.errors import MachineFailed
 
             raise MachineFailed("standard output", error.strerror or str(error)) from error
+
+
+def _printable(text: str) -> str:
+    """The text with escapes for what the standard output cannot encode, such as bytes of names that are no UTF-8."""
+    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
+    return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def _tell(text: str) -> None:

@@ -74,7 +74,9 @@ def read_deck(path: Path) -> tuple[np.ndarray, list[Block], list[str]]:
                     raise BadInput(Fault(str(path), f"element {label}", f"node {node}", "nodes that *Node defines"))
         same = min(len(nodes) for _, nodes in chosen)  # all, where the name is known
         corners = np.array([[row[n] for n in nodes[:same]] for _, nodes in chosen], dtype=np.int64)
-        blocks.append(Block(reader.kind(element_type), element_type, corners, np.array([label for label, _ in chosen])))
+        blocks.append(
+            Block(reader.kind(element_type), element_type, corners, np.array([label for label, _ in chosen]))
+        )
         if element_type in _OTHER_PLANES:
             notes.append(
                 f"{len(chosen)} {element_type} elements are computed in plane strain, not as their name says"

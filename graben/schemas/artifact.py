@@ -11,7 +11,7 @@ import numpy as np
 
 from graben.errors import BadInput, Fault, NotFinite
 from graben.schemas.artifact_marks import DIGEST, attribute_faults, content_digest, seal, seal_broken
-from graben.schemas.files import whole_file
+from graben.schemas.files import unfit, whole_file
 from graben.schemas.provenance import Record
 
 if TYPE_CHECKING:
@@ -127,7 +127,8 @@ def write_artifact(
             encoding.setdefault(name, {})["_FillValue"] = np.nan if declared.may_be_nan or partial else None
     with whole_file(path, ends_run=not partial) as temporary:
         try:
-            dataset.to_netcdf(temporary, engine="netcdf4", format="NETCDF4", encoding=encoding)
+            # Of a relative path a leading ~ would become the home folder.
+            dataset.to_netcdf(temporary.absolute(), engine="netcdf4", format="NETCDF4", encoding=encoding)
         except RuntimeError as error:
             raise OSError(f"{error}") from error  # what the library makes of a full disk
         seal(temporary)
@@ -167,14 +168,19 @@ def check_artifact(path: str | Path, kinds: Iterable[str] | None = None) -> list
     return _read(Path(path), list(kinds) if kinds is not None else list(LAYOUTS), True)[0]
 
 
-def kind_of(path: Path) -> str:
-    """Kind of an artifact as it calls itself; "" where it cannot be told (reading it will say why)."""
+def open_artifact(path: Path) -> xarray.Dataset:
+    """Open without a check. The path is made absolute: libraries take a leading ~ for the home folder."""
     import xarray
 
+    return xarray.open_dataset(path.absolute(), engine="netcdf4", decode_times=False)
+
+
+def kind_of(path: Path) -> str:
+    """Kind of an artifact as it calls itself; "" where it cannot be told (reading it will say why)."""
     try:
         if seal_broken(path):
             return ""
-        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as data:
+        with open_artifact(path) as data:
             return str(data.attrs.get("schema_kind", ""))
     except Exception:
         return ""
@@ -182,15 +188,15 @@ def kind_of(path: Path) -> str:
 
 def _read(path: Path, accepted: list[str], partial: bool) -> tuple[list[Fault], xarray.Dataset | None]:
     """Every fault, or none and the data."""
-    import xarray
-
     file = str(path)
     if not path.is_file():
         return [Fault(file, "", "", "an existing artifact file")], None
+    if unfit(path):
+        return [Fault(file, "", "", unfit(path))], None
     try:
         if seal_broken(path):
             return [Fault(file, "", "", "the bytes that were written; they are damaged")], None
-        with xarray.open_dataset(path, engine="netcdf4", decode_times=False) as dataset:
+        with open_artifact(path) as dataset:
             faults = _faults(file, path.stat().st_size, dataset, accepted, partial)
             return faults, None if faults else dataset.load()
     except Exception as error:  # whatever damaged bytes make of HDF5, netCDF and xarray

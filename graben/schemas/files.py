@@ -101,6 +101,17 @@ def existing_folder(path: Path) -> Path:
     return next((p for p in path.absolute().parents if p.is_dir()), Path(path.anchor or "."))
 
 
+def unfit(path: Path) -> str:
+    """What a path should be where libraries could not open it; empty where they can."""
+    if os.sep != "\\" and "\\" in str(path.absolute()):
+        return "a path without backslashes, which NetCDF takes for slashes"
+    try:
+        str(path.absolute()).encode()
+    except UnicodeEncodeError:
+        return "a path in UTF-8"
+    return ""
+
+
 def part_of(path: Path, process: int | None = None) -> Path:
     """The temporary path of a target; the suffix is kept last because writers choose the format by it."""
     return path.with_name(f".{path.name}.{process or os.getpid()}.part{path.suffix}")

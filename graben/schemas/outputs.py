@@ -15,7 +15,7 @@ from typing import Any
 
 from graben.errors import BadInput, Fault
 from graben.schemas.artifact_marks import seal_broken
-from graben.schemas.files import existing_folder, machine, part_of, recover
+from graben.schemas.files import existing_folder, machine, part_of, recover, unfit
 
 # What is beside an artifact NAME.nc, by the end of its name.
 FOLDER, PVD, MATERIAL = ".vtu", ".pvd", ".material.toml"
@@ -34,7 +34,7 @@ def name_of(output: Path) -> str:
 
 def beside(output: Path, end: str) -> Path:
     """NAME + end in the folder of the output."""
-    return output.with_name(name_of(output) + end)
+    return output.parent / (name_of(output) + end)
 
 
 @dataclass(frozen=True)
@@ -85,6 +85,7 @@ class Outputs:
                 faults += self._faults_of(path, overwrite, path in kept)
         faults += self._twin() if not faults else []
         faults += [f for p in paths for f in _misplaced(p)] if not faults else []
+        faults += [f for p in (self.main, *self.others) for f in _among_fields(p)] if not faults else []
         if faults:
             raise BadInput(faults)
         for path in {p.parent.absolute(): p for p in reversed(paths)}.values():
@@ -101,6 +102,8 @@ class Outputs:
                 earlier = [p for p in paths[:k] if _same(path, p) or _within(path, p) or _within(p, path)]
                 if earlier:
                     yield Fault(str(path), "", "", f"another name than that of the output {earlier[0]}")
+        if self.kept and unfit(self.main):
+            yield Fault(str(self.main), "", "", unfit(self.main))
         if name_of(self.main).endswith(_RESERVED) and self.main.suffix == ".nc":
             yield Fault(str(self.main), "", "", "another name: runs that fail leave files of such names")
 
@@ -128,7 +131,7 @@ class Outputs:
         """Whether graben wrote what lies there, so that `overwrite` may replace it."""
         with suppress(OSError, ValueError, KeyError, RuntimeError):
             if path.suffix == FOLDER and path.is_dir():
-                return all(re.fullmatch(r"\d{4,}\.vtu", p.name) and p.is_file() for p in path.iterdir())
+                return all(_is_state(p) for p in path.iterdir())
             if path.is_file():
                 return path.stat().st_size == 0 or _MARKS.get(path.suffix, _artifact)(path, self.main)
         return False
@@ -136,7 +139,7 @@ class Outputs:
     def _twin(self) -> Iterator[Fault]:
         """Outputs "a" and "a.nc" would share what lies beside them."""
         name = self.main.name
-        other = self.main.with_name(name.removesuffix(".nc") if name.endswith(".nc") else name + ".nc")
+        other = self.main.parent / (name.removesuffix(".nc") if name.endswith(".nc") else name + ".nc")
         if (self.ends or self.kept) and other != self.main and other.is_file() and _artifact(other, self.main):
             yield Fault(str(self.main), "", "", f"another name: files beside it would be those of {other.name}")
 
@@ -169,6 +172,20 @@ def _misplaced(path: Path) -> Iterator[Fault]:
     for above in path.absolute().parents:
         if above != folder and folder in above.parents and os.path.lexists(above):
             yield Fault(str(path), "", "", f"a folder to write to; {above} is none")
+
+
+def _among_fields(path: Path) -> Iterator[Fault]:
+    folder = existing_folder(path)
+    if folder.suffix == FOLDER and any(map(_is_state, folder.iterdir())):
+        yield Fault(str(path), "", "", f"a folder for outputs; {folder} holds the fields of a run")
+
+
+def _is_state(path: Path) -> bool:
+    """Whether a file is one of a series of VTU files, by name and content."""
+    if not (re.fullmatch(r"\d{4,}\.vtu", path.name) and path.is_file()):
+        return False
+    with open(path, "rb") as stream:
+        return b'type="UnstructuredGrid"' in stream.read(300)
 
 
 def _try_to_write(path: Path) -> None:
@@ -206,7 +223,7 @@ def _artifact(path: Path, main: Path) -> bool:
             return False
     if seal_broken(path):
         return True
-    with netCDF4.Dataset(path) as data:
+    with netCDF4.Dataset(path.absolute()) as data:  # it would take a leading ~ as the home folder
         return getattr(data, "software", "") == "graben" or "schema_kind" in data.ncattrs()
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from graben.errors import BadInput, Fault, Incomplete
-from graben.schemas.artifact import PARTIAL, check_artifact
+from graben.schemas.artifact import PARTIAL, check_artifact, open_artifact
 from graben.schemas.kinds import SCENES
 from graben.schemas.scene import Given, load_scene
 
@@ -66,9 +66,7 @@ def _artifact(path: Path) -> list[Fault]:
     """Faults by the layout; where there are none, those that readers of the kind find in what it means."""
     faults = check_artifact(path)
     if not faults:
-        from xarray import open_dataset
-
-        with open_dataset(path, engine="netcdf4", decode_times=False) as data:
+        with open_artifact(path) as data:
             kind, stopped = data.attrs["schema_kind"], PARTIAL in data.attrs
         if not stopped:
             _READERS.get(kind, lambda path: None)(path)

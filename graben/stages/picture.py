@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from graben.errors import BadInput, Fault
 from graben.schemas.artifact import PARTIAL, read_artifact
@@ -11,7 +12,11 @@ from graben.schemas.files import whole_file
 from graben.schemas.kinds import LAYOUTS, layout
 from graben.schemas.outputs import Outputs
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 FORMATS = (".png", ".pdf", ".svg")
+DPI = 130
 
 
 def run(artifact: Path, output: Path, *, overwrite: bool = False) -> None:
@@ -24,6 +29,13 @@ def run(artifact: Path, output: Path, *, overwrite: bool = False) -> None:
     if output.suffix not in FORMATS:
         raise BadInput(Fault(str(output), "", "", "a picture name ending in " + ", ".join(FORMATS)))
     Outputs(output, kept=()).claim([artifact], overwrite=overwrite)
+    figure = figure_of(artifact)
+    with whole_file(output, ends_run=True) as temporary:
+        figure.savefig(temporary, dpi=DPI)
+
+
+def figure_of(artifact: Path) -> Figure:
+    """The picture of an artifact; BadInput where it has faults."""
     dataset = read_artifact(artifact, LAYOUTS, partial=True)
     import matplotlib
 
@@ -40,5 +52,4 @@ def run(artifact: Path, output: Path, *, overwrite: bool = False) -> None:
         words = f"kept by a run that failed; numbers that are not finite are drawn as 0: {stopped}"
         figure.text(0.01, 0.005, words[:160], fontsize=7, color="firebrick")
     drawer.draw(dataset, figure)
-    with whole_file(output, ends_run=True) as temporary:
-        figure.savefig(temporary, dpi=130)
+    return figure

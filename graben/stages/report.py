@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import base64
 import html
+import io
 import json
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -39,12 +39,11 @@ def run(folder: Path, output: Path, *, overwrite: bool = False, progress: Progre
     if not artifacts:
         raise BadInput(Fault(str(folder), "", "", "a folder with artifacts (*.nc)"))
     sections = []
-    with tempfile.TemporaryDirectory() as scratchpad:
-        for number, artifact in enumerate(artifacts):
-            progress(number / len(artifacts), artifact.name)
-            drawn = Path(scratchpad) / (artifact.stem + ".png")
-            picture.run(artifact, drawn)
-            sections.append(_section(artifact, drawn.read_bytes()))
+    for number, artifact in enumerate(artifacts):
+        progress(number / len(artifacts), artifact.name)
+        drawn = io.BytesIO()
+        picture.figure_of(artifact).savefig(drawn, format="png", dpi=picture.DPI)
+        sections.append(_section(artifact, drawn.getvalue()))
     title = f"graben: {folder.name}"
     body = "\n".join(sections)
     page = (

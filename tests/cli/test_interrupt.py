@@ -89,6 +89,23 @@ def test_a_signal_at_any_step_of_a_stage_leaves_nothing(place, number, tmp_path,
     assert signal.getsignal(number) == before
 
 
+def test_a_signal_between_the_pictures_of_a_report_ends_it(small_blocks, tmp_path, monkeypatch):
+    for name in ("a.nc", "b.nc"):
+        (tmp_path / name).write_bytes(small_blocks.read_bytes())
+    stage = import_module("graben.stages.report")
+    real = stage._section
+
+    def signalled(artifact, png):
+        if artifact.name == "a.nc":
+            kill_self(signal.SIGINT)
+        return real(artifact, png)
+
+    monkeypatch.setattr(stage, "_section", signalled)
+    result = command("report", tmp_path, "-o", tmp_path / "page.html")
+    assert result.exit_code == 130, result.output
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.nc", "b.nc"]
+
+
 def test_a_signal_while_a_library_writes_waits_for_it(tmp_path, monkeypatch):
     import xarray
 

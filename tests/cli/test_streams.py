@@ -1,5 +1,7 @@
 """Standard streams that are full, closed, or read by nobody."""
 
+import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,11 +15,11 @@ GOOD = ["check", str(PIPELINES / "wear/astm-g65-mixtures.toml")]
 BAD = ["check", "none.toml"]
 
 
-def graben(arguments, redirection, folder):
+def graben(arguments, redirection, folder, **variables):
     command = f'"$0" -c "from graben.cli.start import graben; graben()" "$@" {redirection}'
     return subprocess.run(
         ["bash", "-c", f"set -o pipefail; {command}", sys.executable, *arguments],
-        cwd=folder, capture_output=True, text=True, check=False,
+        cwd=folder, env={**os.environ, **variables}, capture_output=True, text=True, check=False,
     )  # fmt: skip
 
 
@@ -36,3 +38,26 @@ def test_closed_streams_change_no_exit_code(redirection, tmp_path):
         assert done.returncode == code
         assert "Traceback" not in done.stderr and "fault of the program" not in done.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_the_output_cannot_encode_is_escaped(tmp_path):
+    (tmp_path / "sçène ✓.toml").write_bytes(Path(GOOD[1]).read_bytes())
+    for encoding in ("ascii", "cp1252"):
+        done = graben(["check", "sçène ✓.toml", "--json"], "", tmp_path, PYTHONIOENCODING=encoding)
+        assert done.returncode == 0, done.stderr
+        assert list(json.loads(done.stdout)) == ["sçène ✓.toml"]
+        assert graben(["check", "sçène ✓.toml"], "> said", tmp_path, PYTHONIOENCODING=encoding).returncode == 0
+        assert b"\\u2713.toml" in (tmp_path / "said").read_bytes()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names are text there")
+def test_names_that_are_no_utf_8_are_printed(tmp_path):
+    name = os.fsdecode(b"a\xff.toml")
+    try:
+        (tmp_path / name).write_bytes(Path(GOOD[1]).read_bytes())
+    except OSError:
+        pytest.skip("the file system takes UTF-8 only")
+    for options in ([], ["--json"]):
+        done = graben(["check", name, *options], "", tmp_path)
+        assert done.returncode == 0, done.stderr
+        assert "udcff.toml" in done.stdout

@@ -2,13 +2,15 @@
 
 import random
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from graben.errors import BadInput, NotFinite
 from graben.schemas import kinds
-from graben.schemas.artifact import Layout, Variable, check_artifact, read_artifact, write_artifact
+from graben.schemas.artifact import Layout, Variable, check_artifact, kind_of, read_artifact, write_artifact
+from graben.schemas.outputs import Outputs
 from graben.schemas.provenance import Record
 
 LAYOUT = Layout(
@@ -43,6 +45,17 @@ def test_round_trip_keeps_values_units_and_provenance(tmp_path):
     assert data.attrs["schema_version"] == 2
     assert data.attrs["software"] == "graben"
     assert "wall_s" in data.attrs["cost"]
+
+
+def test_a_tilde_is_a_name_like_any_other(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for path in (Path("~/a.nc"), Path("~a.nc")):
+        write(path)
+        assert path.is_file() and kind_of(path) == "sample"
+        assert check_artifact(path, ["sample"]) == []
+        with pytest.raises(BadInput, match="exist"):
+            Outputs(path).claim([])
+        Outputs(path).claim([], overwrite=True)
 
 
 def test_nan_is_never_written_where_it_means_nothing(tmp_path):

@@ -72,7 +72,7 @@ def test_what_the_user_has_there_is_refused(end, overwrite, tmp_path):
     assert f"k{end}" in said and ("graben wrote" if overwrite else "`overwrite`") in said
 
 
-@pytest.mark.parametrize("content", ["notes.txt", "0000.vtu.bak", "0001.vtu/x"])
+@pytest.mark.parametrize("content", ["notes.txt", "0000.vtu.bak", "0001.vtu/x", "0000.vtu"])
 def test_a_folder_with_files_of_the_user_is_refused(content, tmp_path):
     artifact = tmp_path / "k.nc"
     fields(artifact)
@@ -163,6 +163,31 @@ def test_names_that_are_none(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(BadInput, match="folder"):
         Outputs(Path(name)).claim([], overwrite=True)
+
+
+@pytest.mark.parametrize("name", [".nc", "..nc", "a..nc", "...", "~", "~/a.nc", "a.vtu"])
+def test_odd_names_that_are_some(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Outputs(Path(name), SERIES, (CHECKPOINT, LAST_GOOD + ".nc")).claim([])
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.sep == "\\", reason="backslashes are separators")
+@pytest.mark.parametrize(
+    ("name", "words"), [("a\\b.nc", "backslash"), ("d\\e/a.nc", "backslash"), ("\udcff", "UTF-8")]
+)
+def test_names_that_libraries_do_not_take(name, words, tmp_path):
+    assert words in refused(Outputs(tmp_path / name, SERIES))
+    Outputs(tmp_path / name, kept=()).claim([])  # pictures
+
+
+def test_the_fields_of_another_run_are_no_folder_for_outputs(tmp_path):
+    fields(tmp_path / "a.nc")
+    for name in ("z.nc", "0007.vtu", "sub/z.nc"):
+        assert "fields of a run" in refused(Outputs(tmp_path / "a.vtu" / name))
+        assert "fields of a run" in refused(Outputs(tmp_path / "z.nc", others=(tmp_path / "a.vtu" / name,)))
+    (tmp_path / "user.vtu").mkdir()
+    Outputs(tmp_path / "user.vtu/z.nc").claim([])
 
 
 def test_names_too_long_and_folders_that_are_files(tmp_path):

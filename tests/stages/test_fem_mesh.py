@@ -157,7 +157,7 @@ def test_a_deck_in_two_files(tmp_path):
         (deck("CAX4"), ["6 of kind CAX4", "axisymmetric"]),
         (deck("GAPUNI"), ["6 of kind GAPUNI"]),
         (deck(after=["506, 10, 20, 40"]), ["element 506", "3 nodes"]),
-        (deck("CAX4P", before=["written by meshio"], after=["506, 10,", "20,"]), ["element 506", "4 nodes of a CAX4P"]),
+        (deck("CAX4P", before=["written by meshio"], after=["506, 10,", "20,"]), ["506", "4 nodes of a CAX4P"]),
         (deck(after=["900, 10, 20, 5000, 40"]), ["element 900", "node 5000"]),
         (deck(after=["900, 10, twenty, 50, 40"]), ["*Element", "twenty"]),
         (deck(shape="{}, x{}, {}"), ["*Node", "numbers"]),
