@@ -213,8 +213,8 @@ def _faults(file: str, error: ValidationError) -> list[Fault]:
         elif e["type"] == "extra_forbidden":
             found, expected = _shown(value), "no such key (see `graben scene KIND` for those that exist)"
         elif e["type"] in ("too_short", "too_long"):
-            bound = {"too_short": "at least {min_length} values", "too_long": "at most {max_length} values"}[e["type"]]
-            found, expected = _shown(value), bound.format(**e["ctx"])
+            least, most = e["ctx"].get("min_length"), e["ctx"].get("max_length")
+            found, expected = _shown(value), f"at most {most} values" if least is None else f"at least {least} values"
         else:
             found = _shown(value) if not isinstance(value, dict | BaseModel) else ""
             expected = e["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
