@@ -19,6 +19,13 @@ _HOME = {
     "open": "graben.api.artifacts",
     "provenance": "graben.api.artifacts",
     "Provenance": "graben.api.artifacts",
+    "material": "graben.api.materials",
+    "Material": "graben.api.materials",
+    "follow": "graben.api.materials",
+    "Followed": "graben.api.materials",
+    "law": "graben.api.materials",
+    "laws": "graben.api.materials",
+    "Parameter": "graben.api.materials",
     "GrabenError": "graben.errors",
     "BadInput": "graben.errors",
     "Fault": "graben.errors",
@@ -30,6 +37,13 @@ if TYPE_CHECKING:
     from graben.api.artifacts import Provenance as Provenance
     from graben.api.artifacts import open as open
     from graben.api.artifacts import provenance as provenance
+    from graben.api.materials import Followed as Followed
+    from graben.api.materials import Material as Material
+    from graben.api.materials import Parameter as Parameter
+    from graben.api.materials import follow as follow
+    from graben.api.materials import law as law
+    from graben.api.materials import laws as laws
+    from graben.api.materials import material as material
     from graben.api.scenes import check as check
     from graben.api.scenes import scene as scene
     from graben.api.stages import Result as Result

@@ -17,6 +17,8 @@ from graben.schemas.scene import Given
 if TYPE_CHECKING:
     import xarray
 
+    from graben.api.materials import Material
+
 Progress = Callable[[float, str], None]
 
 # Kind of scene -> its stage, and what that takes beside the scene.
@@ -77,7 +79,7 @@ def run(
     output: str | Path | None = None,
     *,
     set: Mapping[str, Any] | None = None,
-    material: File | None = None,
+    material: File | Material | None = None,
     inputs: Sequence[File] | None = None,
     curves: Sequence[File] | None = None,
     validate: Sequence[File] | None = None,
@@ -96,7 +98,7 @@ def run(
     scene : a TOML file, tables, a scene, or a kind for its defaults; see `graben.scene`
     output : name of the artifact; a temporary one unless given
     set : values that replace keys of the scene, by dotted name
-    material : kinds "fem" and "scratch": a material file, or the result of a calibration, instead of the scene's
+    material : kinds "fem" and "scratch": a material, its file, or the result of a calibration, instead of the scene's
     inputs : kind "rev-study": runs of blocks
     curves, validate, compare : kind "calibrate": files of curves to fit instead of the scene's, files to predict
         only, scenes of rival laws
@@ -113,6 +115,8 @@ def run(
     """
     model = checked(scene, set)
     stage, takes = _STAGES[model.kind]
+    if isinstance(material, Mapping) and not isinstance(material, Result):
+        model, material = checked(model, {"material": dict(material)}), None
     given = {
         "material": material, "inputs": inputs, "curves": curves, "validate": validate, "compare": compare,
         "bed": bed, "scratch": scratch, "cluster": cluster, "restart": restart,

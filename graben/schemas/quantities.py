@@ -101,6 +101,9 @@ _UNITS = {
     "s": ("100 s", 1e-15, 1e15),
     "1/s": ("10 1/s", 1e-15, 1e18),
 }
+KNOWN = tuple(_UNITS)
+"""SI units that scenes know."""
+
 _ANGULAR = {
     "rad": "an angle names its unit, deg or rad",
     "rad/s": "an angular speed names its angle: rpm, deg/s or rad/s",

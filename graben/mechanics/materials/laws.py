@@ -17,7 +17,7 @@ the record to `_RECORDS` and a branch to `update` (and to `prepare`, if the law 
 the equivalent plastic strain, index 1 the damage, where they exist.
 
 ids: 0 elastic, 1 j2, 2 mohr-coulomb, 3 drucker-prager, 4 lubliner, 5 erve, 6 transverse-elastic,
-7 energy-damage.
+7 energy-damage. Laws that `register` adds at run time have ids from 256 on, or below -255; see `foreign.py`.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
 from graben.mechanics.compiled import kernel
 from graben.mechanics.materials.drucker_prager import (
     DRUCKER_PRAGER,
@@ -37,6 +38,7 @@ from graben.mechanics.materials.drucker_prager import (
 from graben.mechanics.materials.elastic import ELASTIC, update_elastic
 from graben.mechanics.materials.energy_damage import ENERGY_DAMAGE, update_energy_damage
 from graben.mechanics.materials.erve import ERVE, update_erve
+from graben.mechanics.materials.foreign import FIRST, update_foreign
 from graben.mechanics.materials.j2 import J2, update_j2
 from graben.mechanics.materials.law import UNKNOWN_LAW, Law
 from graben.mechanics.materials.lubliner import LUBLINER, prepare_lubliner, update_lubliner
@@ -55,6 +57,8 @@ _RECORDS: tuple[Law, ...] = (
 )
 
 LAWS: dict[str, Law] = {record.name: record for record in _RECORDS}
+
+_OURS = frozenset(LAWS)
 
 
 @kernel(error_model="numpy")
@@ -76,6 +80,8 @@ def update(law_id, deps, sig, state, par, length, tangent):
         return update_transverse(deps, sig, state, par, length, tangent)
     if law_id == 7:
         return update_energy_damage(deps, sig, state, par, length, tangent)
+    if abs(law_id) >= FIRST:
+        return update_foreign(law_id, deps, sig, state, par, length, tangent)
     return UNKNOWN_LAW
 
 
@@ -95,16 +101,23 @@ def prepare(law_id, par):
 @kernel(error_model="numpy")
 def isotropic(law_id):
     """Whether the law of that id knows no direction; one that does is named here."""
-    return law_id != 6
+    return law_id >= 0 and law_id != 6
+
+
+def register(record: Law) -> None:
+    """Make a law from outside known by its name in this process; one of that name from outside is replaced."""
+    if record.name in _OURS:
+        raise ValueError(f"{record.name!r} is a law of the package")
+    LAWS[record.name] = record
 
 
 def find(name: str) -> Law:
-    """The law of that name; ValueError that lists the known ones."""
+    """The law of that name; Refused lists the known ones."""
     if name not in LAWS:
-        raise ValueError(f"no law {name!r}; known: {', '.join(sorted(LAWS))}")
+        raise Refused(f"no law {name!r}; known: {', '.join(sorted(LAWS))}")
     return LAWS[name]
 
 
 def pack(name: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Named parameters in SI -> par of the law of that name; ValueError that lists every fault."""
+    """Named parameters in SI -> par of the law of that name; Refused lists every fault."""
     return find(name).pack(values)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import Refused
 from graben.mechanics.compiled import kernel
 from graben.mechanics.materials.law import OK
 from graben.mechanics.materials.laws import find, update
@@ -267,7 +268,7 @@ def follow(
     tolerance : on the stress under stress control, relative to the largest stress
     rows : (paths,) how many steps of each path count, default all
 
-    Raises ValueError for shapes that do not fit, unknown control letters or values that are not finite.
+    Refused for shapes that do not fit, unknown control letters or values that are not finite.
     """
     record = find(law)
     goal = np.array(targets, dtype=np.float64)
@@ -279,23 +280,26 @@ def follow(
         if stress is not None and np.shape(stress)[-1:] == (3,):
             stress = np.insert(np.asarray(stress, dtype=np.float64), 2, 0.0, axis=-1)
     if goal.ndim != 3 or goal.shape[2] not in (4, 6) or goal.shape[1] < 1:
-        raise ValueError(f"targets: expected (paths, steps, 3, 4 or 6), found {np.shape(targets)}")
+        raise Refused(f"targets: expected (paths, steps, 3, 4 or 6), found {np.shape(targets)}")
     paths, steps, n = goal.shape
     count = np.full(paths, steps, np.int64) if rows is None else np.ascontiguousarray(rows, dtype=np.int64)
     if count.shape != (paths,) or count.min() < 1 or count.max() > steps:
-        raise ValueError(f"rows: expected ({paths},) numbers from 1 to {steps}, found {rows!r}")
+        raise Refused(f"rows: expected ({paths},) numbers from 1 to {steps}, found {rows!r}")
     for p in range(paths):
         if not np.isfinite(goal[p, : count[p]]).all():
-            raise ValueError(f"targets of path {p}: expected finite numbers")
+            raise Refused(f"targets of path {p}: expected finite numbers")
     words = [control] * paths if isinstance(control, str) else list(control)
     if len(words) != paths or any(len(w) != n or set(w) - {"e", "s"} for w in words):
-        raise ValueError(f"control: expected {n} letters e or s for each of {paths} paths, found {control!r}")
+        raise Refused(f"control: expected {n} letters e or s for each of {paths} paths, found {control!r}")
     flags = np.array([[1 if letter == "s" else 0 for letter in w] for w in words], dtype=np.int64)
     for p in range(paths):  # engineering shear inside
         goal[p, :, 3:] *= np.where(flags[p, 3:] == 1, 1.0, 2.0)
-    sig = np.zeros((paths, n)) if stress is None else np.array(np.broadcast_to(stress, (paths, n)), dtype=np.float64)
+    begin = np.zeros(n) if stress is None else np.asarray(stress, dtype=np.float64)
+    if begin.shape not in ((n,), (paths, n)) or not np.isfinite(begin).all():
+        raise Refused(f"stress at the start: expected ({n},) or ({paths}, {n}) finite numbers, found {begin.shape}")
+    sig = np.array(np.broadcast_to(begin, (paths, n)))
     if parts < 1:
-        raise ValueError(f"parts: expected at least 1, found {parts}")
+        raise Refused(f"parts: expected at least 1, found {parts}")
     eps = np.where(flags == 1, 0.0, goal[:, 0])
     start = record.initial_state(par)
     state = np.repeat(start[None], paths, axis=0)

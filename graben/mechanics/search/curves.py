@@ -176,6 +176,13 @@ class CurveFit:
         self._start = record.initial_state(self._base)
         self._arrange()
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the law's id, which may differ in another process."""
+        return {name: value for name, value in self.__dict__.items() if name != "_id"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, _id=find(state["law"]).id)
+
     @staticmethod
     def stand_in(law: str, fixed: Mapping[str, Any], free: Sequence[str]) -> dict[str, Any]:
         """Named values with a number for every free parameter; Refused when the law does not take them."""

@@ -19,7 +19,7 @@ from pydantic import model_validator
 
 from graben.errors import BadInput, Fault, Refused
 from graben.schemas.files import whole_file
-from graben.schemas.quantities import key, plain_number, to_si
+from graben.schemas.quantities import KNOWN, key, plain_number, to_si
 from graben.schemas.reading import parse_toml, read_toml
 from graben.schemas.scene import InputFile, Model
 
@@ -110,6 +110,21 @@ UNITS: dict[str, dict[str, str]] = {
     "energy-damage": {**_ELASTIC, "damage_threshold": "Pa", "split": "word", "max_damage": "1", **_METAL},
 }
 """law -> parameter -> SI unit, "word" or "table" (plastic strain, stress in Pa). A test holds it to the laws."""
+
+_OURS = frozenset(UNITS)
+
+
+def declare(law: str, units: Mapping[str, str]) -> None:
+    """Let scenes of this process name a law from outside.
+
+    Refused for the name of a law of the package, and for a unit that scenes do not know.
+    """
+    if law in _OURS:
+        raise Refused(f"another name: {law!r} is a law of the package")
+    for name, unit in units.items():
+        if unit != "1" and unit not in KNOWN:
+            raise Refused(f"{name} in one of the units 1, {', '.join(KNOWN)}, not {unit!r}")
+    UNITS[law] = dict(units)
 
 
 def parameter_to_si(law: str, name: str, value: Any) -> Any:
@@ -237,6 +252,11 @@ def material_text(law: str, values: Mapping[str, Any], note: str = "") -> str:
             human = next((f"  # {number / s:.4g} {u}" for u, s in _READABLE.get(unit, ()) if abs(number) >= s), "")
             lines.append(f'{name} = "{number!r} {unit}"{human}')
     return "\n".join(lines) + "\n"
+
+
+def material_table(law: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    """The table of a scene that holds a law and its values in SI, with quantities as text."""
+    return parse_toml(material_text(law, values))
 
 
 def write_material(path: str | Path, law: str, values: Mapping[str, Any], note: str = "") -> None:
