@@ -26,6 +26,18 @@ _HOME = {
     "law": "graben.api.materials",
     "laws": "graben.api.materials",
     "Parameter": "graben.api.materials",
+    "fit": "graben.api.fits",
+    "Fit": "graben.api.fits",
+    "curve": "graben.api.fits",
+    "average": "graben.api.averages",
+    "Average": "graben.api.averages",
+    "voronoi_blocks": "graben.api.bodies",
+    "block_model": "graben.api.bodies",
+    "Blocks": "graben.api.bodies",
+    "bed": "graben.api.bodies",
+    "mesh": "graben.api",
+    "plane_analysis": "graben.api.plane",
+    "PlaneAnalysis": "graben.api.plane",
     "GrabenError": "graben.errors",
     "BadInput": "graben.errors",
     "Fault": "graben.errors",
@@ -34,9 +46,19 @@ _HOME = {
 }
 
 if TYPE_CHECKING:
+    from graben.api import mesh as mesh
     from graben.api.artifacts import Provenance as Provenance
     from graben.api.artifacts import open as open
     from graben.api.artifacts import provenance as provenance
+    from graben.api.averages import Average as Average
+    from graben.api.averages import average as average
+    from graben.api.bodies import Blocks as Blocks
+    from graben.api.bodies import bed as bed
+    from graben.api.bodies import block_model as block_model
+    from graben.api.bodies import voronoi_blocks as voronoi_blocks
+    from graben.api.fits import Fit as Fit
+    from graben.api.fits import curve as curve
+    from graben.api.fits import fit as fit
     from graben.api.materials import Followed as Followed
     from graben.api.materials import Material as Material
     from graben.api.materials import Parameter as Parameter
@@ -44,6 +66,8 @@ if TYPE_CHECKING:
     from graben.api.materials import law as law
     from graben.api.materials import laws as laws
     from graben.api.materials import material as material
+    from graben.api.plane import PlaneAnalysis as PlaneAnalysis
+    from graben.api.plane import plane_analysis as plane_analysis
     from graben.api.scenes import check as check
     from graben.api.scenes import scene as scene
     from graben.api.stages import Result as Result
@@ -61,7 +85,8 @@ __all__ = sorted([*_HOME, "__version__"])
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'graben' has no attribute {name!r}")
-    value = getattr(import_module(_HOME[name]), name)
+    home = import_module(_HOME[name])
+    value = import_module("graben.api.mesh") if name == "mesh" else getattr(home, name)
     globals()[name] = value
     return value
 

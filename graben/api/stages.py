@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from graben.api.artifacts import open as open_artifact
 from graben.api.scenes import scene as checked
+from graben.api.units import si
 from graben.errors import BadInput, Fault
 from graben.schemas.scene import Given
 
@@ -181,9 +182,9 @@ def homogenize(
     radii = radius if isinstance(radius, Sequence) and not isinstance(radius, str) else [radius]
     runs = [path_of(p) for p in several]
     asked: dict[str, Any] = {
-        "radii": [metres(r, "radius") for r in radii if r is not None],
-        "centre": None if centre is None else [metres(c, "centre") for c in centre],
-        "polygon": [(metres(x, "polygon"), metres(y, "polygon")) for x, y in polygon or ()],
+        "radii": [si(r, "m", "radius") for r in radii if r is not None],
+        "centre": None if centre is None else [si(c, "m", "centre") for c in centre],
+        "polygon": [(si(x, "m", "polygon"), si(y, "m", "polygon")) for x, y in polygon or ()],
         "deformed": deformed,
         "chosen_at": chosen_at,
         "steps_picture": None if steps is None else Path(steps),
@@ -196,17 +197,6 @@ def homogenize(
 def path_of(given: File) -> Path:
     """The file of a result, or the one that is named."""
     return given.output if isinstance(given, Result) else Path(given)
-
-
-def metres(length: float | str, argument: str) -> float:
-    """A length in m; BadInput names the argument."""
-    from graben.errors import Refused
-    from graben.schemas.quantities import to_si
-
-    try:
-        return to_si(length, "m") if isinstance(length, str) else float(length)
-    except (Refused, TypeError, ValueError) as error:
-        raise BadInput(Fault("", argument, repr(length), f"a length ({error})", True)) from None
 
 
 def _files(given: Any) -> Any:

@@ -70,19 +70,51 @@ def prepare(
     if not sources:
         expected = "at least one file of curves, here or in the call"
         raise Incomplete(Fault(str(file), "curves", "[]", expected))
-    reading = Reading(scene.test, scene.csv.sign, scene.csv.allow_tension, scene.csv.allow_narrowing)
-    files = read_files([*sources, *validate], reading)
+    files = read_files([*sources, *validate], reading_of(scene))
     measured = [curve for part in files[: len(sources)] for curve in part.curves]
     unseen = [curve for part in files[len(sources) :] for curve in part.curves]
-    sizes = sizes_of(problem, len(others), measured)
-    refuse_too_large(file, sizes)
-    for p in (problem, *others):
+    sizes = _checked([problem, *others], measured)
+    read = {part.file: part.read for part in files}
+    return Prepared(sources, problem, others, measured, unseen, read, sizes)
+
+
+def prepare_curves(scene: CalibrateScene, measured: list[Curve]) -> Prepared:
+    """As `prepare`, for curves that lie in no file."""
+    file = scene.source.path
+    problem = problem_of(scene, file, label(file, []), scene.workers if scene.search != "appso" else 1)
+    return Prepared([], problem, [], measured, [], {}, _checked([problem], measured))
+
+
+def reading_of(scene: CalibrateScene) -> Reading:
+    """How the scene says to read curves."""
+    return Reading(scene.test, scene.csv.sign, scene.csv.allow_tension, scene.csv.allow_narrowing)
+
+
+def _checked(problems: Sequence[Problem], measured: Sequence[Curve]) -> list[Estimate]:
+    sizes = sizes_of(problems[0], len(problems) - 1, measured)
+    refuse_too_large(problems[0].scene.source.path, sizes)
+    for p in problems:
         try:
             p.check(measured)
         except Refused as error:
             raise BadInput(Fault(str(p.scene.source.path), "", "", f"a law that can be fitted ({error})")) from error
-    read = {part.file: part.read for part in files}
-    return Prepared(sources, problem, others, measured, unseen, read, sizes)
+    return sizes
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What the curves tell, of which nothing is written.
+
+    headline : numbers; material : law's parameters in SI, fixed and found, and the note of their file
+    arrays, attributes, cost : of the artifact
+    """
+
+    headline: dict[str, Any]
+    material: dict[str, Any]
+    note: str
+    arrays: dict[str, Any]
+    attributes: dict[str, Any]
+    cost: dict[str, Any]
 
 
 @keeps_last_good("no start of the search had finished yet")
@@ -125,35 +157,51 @@ def run(
     threads = scene.workers if scene.search != "appso" and cluster is None else 1
     prepared = prepare(scene, curves, validate, compare, threads)
     sources, problem, others = prepared.sources, prepared.problem, prepared.others
-    measured, unseen = prepared.measured, prepared.unseen
     record = Record.begin(scene, [*sources, *validate, *compare])
     texts = [p.scene.source.effective_text for p in (problem, *others)]
-    folds = scene.cross_validation or bool(others)
-    share = 0.95 / (1 + folds + 2 * len(others))
     with workers_of(scene.search, scene.workers, problem.plan.particles, cluster) as workers:
         state = State(beside(output, STATE), digest_of(texts, sources), workers)
         if restart:
             state.load()
         keep_by(lambda why: state.path if any(state.starts.values()) else None)
-        objective, found = problem.solve(
-            measured, problem.plan, state, "all curves", lambda part, words: progress(share * part, words)
+        fitted = fit_curves(prepared, state, progress)
+    record.cost.update(fitted.cost)
+    record.warnings = fitted.headline["warnings"]
+    with together():
+        write_material(material_path, scene.law, fitted.material, fitted.note)
+        write_whole(output, LAYOUT, fitted.arrays, record, fitted.attributes)
+    state.finish()
+    progress(1.0, "done")
+    return {**fitted.headline, "read": prepared.read, "output": str(output), "material": str(material_path)}
+
+
+def fit_curves(prepared: Prepared, state: State, progress: Progress = silent) -> Fitted:
+    """Search for the parameters, and find out how well the curves tell them.
+
+    state : who helps, and what is done already
+    """
+    problem, others = prepared.problem, prepared.others
+    measured, unseen = prepared.measured, prepared.unseen
+    scene = problem.scene
+    folds = scene.cross_validation or bool(others)
+    share = 0.95 / (1 + folds + 2 * len(others))
+    objective, found = problem.solve(
+        measured, problem.plan, state, "all curves", lambda part, words: progress(share * part, words)
+    )
+    settled = settle(objective, found.best)
+    fit, best = objective.fit, settled.best
+    evaluations = found.evaluations + best.evaluations - found.best.evaluations
+    values = fit.used(problem.box.to_values(best.x))
+    errors = fit.errors(values)
+    holdout, candidates = None, []
+    if folds:
+        holdout = cross_validate(problem, measured, state, lambda part, words: progress(share * (1 + part), words))
+    if others and holdout is not None:
+        first = Candidate(problem.name, scene.law, problem.box.size, errors["stress"], holdout)
+        rest = compared(
+            others, measured, state, lambda part, words: progress(share * 2 + (0.95 - 2 * share) * part, words)
         )
-        settled = settle(objective, found.best)
-        fit, best = objective.fit, settled.best
-        evaluations = found.evaluations + best.evaluations - found.best.evaluations
-        values = fit.used(problem.box.to_values(best.x))
-        errors = fit.errors(values)
-        holdout, candidates = None, []
-        if folds:
-            holdout = cross_validate(
-                problem, measured, state, lambda part, words: progress(share * (1 + part), words)
-            )
-        if others and holdout is not None:
-            first = Candidate(problem.name, scene.law, problem.box.size, errors["stress"], holdout)
-            rest = compared(
-                others, measured, state, lambda part, words: progress(share * 2 + (0.95 - 2 * share) * part, words)
-            )
-            candidates = [first, *rest]
+        candidates = [first, *rest]
     data = slice(0, fit.groups.size)  # priors follow
     known = identify(
         best.x, best.residuals[data], best.jacobian[data], groups=fit.groups, lag=scene.correlation_length,
@@ -167,10 +215,10 @@ def run(
     ordered = {p.name: material[p.name] for p in LAWS[scene.law].parameters if p.name in material}
     note = note_of(scene, measured, errors)
     arrays = arrays_of(problem, fit, measured, unseen, values, known, errors, holdout, members, found, candidates)
-    record.cost.update(
-        evaluations=evaluations, curves=len(measured), increments_per_point=problem.increments,
-        objective=best.value,
-    )  # fmt: skip
+    cost = {
+        "evaluations": evaluations, "curves": len(measured), "increments_per_point": problem.increments,
+        "objective": best.value,
+    }  # fmt: skip
     attributes = {
         "law": scene.law,
         "material": material_text(scene.law, ordered, note),
@@ -183,10 +231,5 @@ def run(
     headline = headline_of(
         scene, problem, measured, unseen, values, known, starts, errors, holdout, arrays, candidates
     )
-    headline["warnings"] = record.warnings = warnings_of(measures_of(headline))
-    with together():
-        write_material(material_path, scene.law, ordered, note)
-        write_whole(output, LAYOUT, arrays, record, attributes)
-    state.finish()
-    progress(1.0, "done")
-    return {**headline, "read": prepared.read, "output": str(output), "material": str(material_path)}
+    headline["warnings"] = warnings_of(measures_of(headline))
+    return Fitted(headline, ordered, note, arrays, attributes, cost)

@@ -28,16 +28,19 @@ def digest_of(scene_texts: Iterable[str], inputs: Iterable[Path]) -> str:
 
 @dataclass
 class State:
-    """Finished starts by search (a name) and number, written to `path` after each; `finish` removes the file."""
+    """Finished starts by search (a name) and number, written to `path` after each; `finish` removes the file.
 
-    path: Path
+    path : None for a search that leaves nothing
+    """
+
+    path: Path | None
     digest: str
     workers: Workers
     starts: dict[str, dict[int, Start]] = field(default_factory=dict)
 
     def load(self) -> None:
         """Take up what an interrupted run left; without a file nothing was left. BadInput where it does not fit."""
-        if not self.path.is_file():
+        if self.path is None or not self.path.is_file():
             return
         expected = "that of the same scene, curves and version; without `restart` it is begun anew"
         tables = read_saved(self.path, {"digest": self.digest}, expected)
@@ -72,7 +75,8 @@ class State:
         return Help(self.workers.executor, self.workers.chunk, dict(own), keep)
 
     def finish(self) -> None:
-        self.path.unlink(missing_ok=True)
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
 
     def _write(self) -> None:
         tables = {}
@@ -80,4 +84,5 @@ class State:
             for number, start in numbers.items():
                 for name in ("members", "values", "reasons", "history", "evaluations"):
                     tables[f"{search}|{number}|{name}"] = getattr(start, name)
-        write_saved(self.path, {"digest": self.digest}, tables)
+        if self.path is not None:
+            write_saved(self.path, {"digest": self.digest}, tables)

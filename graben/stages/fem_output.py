@@ -10,6 +10,7 @@ import numpy as np
 
 from graben.mechanics.continuum.body import Body, State
 from graben.mechanics.continuum.march import March
+from graben.mechanics.continuum.mesh2d import QuadMesh
 from graben.mechanics.continuum.newton import Step
 from graben.mechanics.continuum.surface import free_surface
 from graben.schemas.artifact import write_artifact
@@ -80,19 +81,15 @@ class History:
         return float((movement[last] / rise[last]) / (movement[first] / rise[first]))
 
 
-def write_run(
-    path: Path,
-    record: Record,
+def arrays_of(
     scene: FemScene,
     body: Body,
     settled: March,
     history: History,
     support_nodes: list[np.ndarray],
     external: Callable[[float], np.ndarray],
-    headline: dict[str, Any],
-    partial: str = "",
-) -> None:
-    """Write the artifact and, beside it, the VTU series; fields are element means (damage: the largest)."""
+) -> dict[str, Any]:
+    """Arrays of the layout "fem"; fields are element means (damage: the largest)."""
     states = history.states()
     mesh, gravity = body.mesh, settled.state.displacement.reshape(-1, 2)
     weight = body.elements.weight / body.elements.weight.sum(axis=1, keepdims=True)
@@ -111,7 +108,7 @@ def write_run(
     reaction = np.stack(
         [np.where(axis_fixed, (f - external(t)).reshape(-1, 2), 0.0).sum(axis=0) for t, _, f in states]
     )
-    arrays = {
+    return {
         "mesh": 0,
         "node_x": mesh.points[:, 0],
         "node_y": mesh.points[:, 1],
@@ -135,6 +132,17 @@ def write_run(
         "step_settlement": history.settlement,
         "step_iterations": history.iterations,
     }
+
+
+def write_run(
+    path: Path,
+    record: Record,
+    mesh: QuadMesh,
+    arrays: dict[str, Any],
+    headline: dict[str, Any],
+    partial: str = "",
+) -> None:
+    """Write the artifact and, beside it, the VTU series."""
     failure = headline["failure_load_pa"]
     attributes = {
         "failed": int(headline["failed"]),
@@ -144,16 +152,20 @@ def write_run(
     }
     with together():
         with vtu_series(path) as series:
-            for k, time in enumerate(times):
+            for k, time in enumerate(arrays["time"]):
+                stress, strain = arrays["stress"][k], arrays["strain"][k]
                 fields = {
-                    "stress": _six(stress[k]),
-                    "strain": _six(strain[k]),
-                    "mean_stress": stress[k, :, :3].mean(axis=1),
-                    "von_mises_stress": von_mises(stress[k]),
-                    "plastic_strain": plastic[k],
-                    "damage": damage[k],
+                    "stress": _six(stress),
+                    "strain": _six(strain),
+                    "mean_stress": stress[:, :3].mean(axis=1),
+                    "von_mises_stress": von_mises(stress),
+                    "plastic_strain": arrays["plastic_strain"][k],
+                    "damage": arrays["damage"][k],
                 }
-                points = {"displacement": movement[k], "gravity_displacement": gravity}
+                points = {
+                    "displacement": arrays["displacement"][k],
+                    "gravity_displacement": arrays["gravity_displacement"],
+                }
                 series.add(time, mesh.points, {"quad": mesh.quads}, points, fields)
         write_artifact(path, LAYOUT, arrays, record, attributes, partial=partial)
 

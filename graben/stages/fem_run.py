@@ -20,7 +20,7 @@ from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.fem import FemScene
 from graben.stages.estimate import Estimate, refuse_too_large
 from graben.stages.fem_mesh import mesh_of
-from graben.stages.fem_output import History, write_run
+from graben.stages.fem_output import History, arrays_of, write_run
 from graben.stages.fem_sizes import sizes_of
 from graben.stages.last_good import keep_by, keeps_last_good
 from graben.stages.material import pack_material
@@ -94,48 +94,78 @@ def run(
     progress(0.0, "meshing")
     problem, inputs, _ = prepare(scene, material)
     record = Record.begin(scene, inputs)
-    notes = {"mesh_notes": list(problem.notes)} if problem.notes else {}
-    record.cost |= notes
-    body = problem.body
-    progress(0.01, f"{len(body.mesh.quads)} elements; gravity")
-    newton = NewtonOptions(scene.stepping.tolerance, scene.stepping.max_iterations)
-    settled = march(body, body.untouched(), lambda t: t * problem.steady, 0.0, 1.0, _GRAVITY_STEPS, newton)
-    settling = problem.unit_pressure / problem.loaded_length
-    history = History(scene, settled, settling, problem.loaded_length, problem.offset)
-    headline: dict[str, Any] = {
-        "failed": True,
-        "failure_load_pa": None,
-        "compliance_ratio": 1.0,
-        "stiffness_ratio": 1.0,
-    }
-    carried = problem if settled.complete else replace(problem, steady=settled.time * problem.steady)
+    analysis = Analysis(scene, problem)
 
     def write(path: Path, partial: str = "") -> Path:
-        nodes = problem.support_nodes
-        write_run(path, record, scene, body, settled, history, nodes, carried.external, headline, partial)
+        record.cost |= analysis.cost
+        record.warnings = analysis.headline["warnings"]
+        write_run(path, record, problem.body.mesh, analysis.arrays(), analysis.headline, partial)
         return path
 
-    keep_by(lambda why: write(last_good, why))
-    if not settled.complete:
-        raise NumericsFailed(
-            f"no equilibrium beyond {100 * settled.time:.3g} % of gravity ({settled.reason})",
-            advice="the body does not stand under its own weight: check supports, strength and density",
-        )
-    loaded = _load_up(scene, problem, settled, newton, history, progress)
-    failed = not loaded.complete
-    headline = _headline(scene, problem, settled, loaded, history) | notes
-    record.cost.update(_cost(body, settled, loaded, headline))
-    headline["warnings"] = record.warnings = warnings_of(_measures(headline))
+    keep_by(lambda why: write(last_good, why) if analysis.begun else None)
+    headline = analysis.solve(progress)
     progress(0.98, "writing")
-    if failed and scene.stepping.goal == "end":
-        raise NumericsFailed(
-            f"no equilibrium beyond load time {loaded.time:.6g} s of {scene.stepping.end:g} s ({loaded.reason})",
-            step=len(loaded.iterations),
-            advice='set stepping.goal = "failure" if this load is what you want, or lower stepping.smallest',
-        )
     write(output)
     progress(1.0, "done")
     return headline
+
+
+class Analysis:
+    """A problem on its way to the end of its loads, of which nothing is written.
+
+    Attributes
+    ----------
+    headline : numbers, as `run` returns them; cost : figures for the record
+    begun : whether there is a state to keep
+    """
+
+    def __init__(self, scene: FemScene, problem: Problem) -> None:
+        self.scene, self.problem, self.begun = scene, problem, False
+        notes = {"mesh_notes": list(problem.notes)} if problem.notes else {}
+        self.cost: dict[str, Any] = dict(notes)
+        self.headline: dict[str, Any] = {
+            "failed": True, "failure_load_pa": None, "compliance_ratio": 1.0, "stiffness_ratio": 1.0, "warnings": [],
+        }  # fmt: skip
+        self._notes = notes
+
+    def solve(self, progress: Progress = silent) -> dict[str, Any]:
+        """Gravity, then the rising loads; returns the headline numbers.
+
+        Raises
+        ------
+        NumericsFailed : no equilibrium under gravity, or before the end where the goal is the end
+        """
+        scene, problem, body = self.scene, self.problem, self.problem.body
+        progress(0.01, f"{len(body.mesh.quads)} elements; gravity")
+        newton = NewtonOptions(scene.stepping.tolerance, scene.stepping.max_iterations)
+        settled = march(body, body.untouched(), lambda t: t * problem.steady, 0.0, 1.0, _GRAVITY_STEPS, newton)
+        settling = problem.unit_pressure / problem.loaded_length
+        self.settled = settled
+        self.history = History(scene, settled, settling, problem.loaded_length, problem.offset)
+        self.begun = True
+        if not settled.complete:
+            raise NumericsFailed(
+                f"no equilibrium beyond {100 * settled.time:.3g} % of gravity ({settled.reason})",
+                advice="the body does not stand under its own weight: check supports, strength and density",
+            )
+        loaded = _load_up(scene, problem, settled, newton, self.history, progress)
+        headline = _headline(scene, problem, settled, loaded, self.history) | self._notes
+        self.cost |= _cost(body, settled, loaded, headline)
+        headline["warnings"] = warnings_of(_measures(headline))
+        self.headline = headline
+        if not loaded.complete and scene.stepping.goal == "end":
+            raise NumericsFailed(
+                f"no equilibrium beyond load time {loaded.time:.6g} s of {scene.stepping.end:g} s ({loaded.reason})",
+                step=len(loaded.iterations),
+                advice='set stepping.goal = "failure" if this load is what you want, or lower stepping.smallest',
+            )
+        return headline
+
+    def arrays(self) -> dict[str, Any]:
+        """Arrays of the layout "fem"."""
+        problem, settled = self.problem, self.settled
+        carried = problem if settled.complete else replace(problem, steady=settled.time * problem.steady)
+        return arrays_of(self.scene, problem.body, settled, self.history, problem.support_nodes, carried.external)
 
 
 def prepare(scene: FemScene, material: Path | None = None) -> tuple[Problem, list[Path], list[Estimate]]:
@@ -157,11 +187,12 @@ def prepare(scene: FemScene, material: Path | None = None) -> tuple[Problem, lis
     if scene.mesh.method == "file":
         sizes = sizes_of(scene, len(mesh.quads))
         refuse_too_large(file, sizes)
-    problem = _problem(scene, mesh, Material(law.id, parameters, law.initial_state(parameters)))
+    problem = problem_of(scene, mesh, Material(law.id, parameters, law.initial_state(parameters)))
     return replace(problem, notes=tuple(notes)), inputs, sizes
 
 
-def _problem(scene: FemScene, mesh: QuadMesh, law: Material) -> Problem:
+def problem_of(scene: FemScene, mesh: QuadMesh, law: Material) -> Problem:
+    """Supports and loads of a scene on a mesh, whichever the scene asks for; BadInput names every fault."""
     file = str(scene.source.path)
     faults: list[Fault] = []
     fixed = np.zeros((len(mesh.points), 2), dtype=bool)

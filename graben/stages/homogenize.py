@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -78,17 +79,65 @@ def run(
     ------
     BadInput : faults of the inputs, a REV outside the model, an output that exists
     """
-    if bool(radii) == bool(polygon):
-        raise BadInput(Fault("homogenize", "radius", "", "either a `radius` or a `polygon`", True))
+    _either(radii, polygon)
     pictures = () if steps_picture is None else (steps_picture,)
     Outputs(output, SERIES if vtk else (), others=pictures).claim(inputs, overwrite=overwrite)
+    record = Record.begin(None, inputs=_existing(inputs))
+    drawn = "steps" if steps_picture is not None else "vtk" if vtk else ""
+    found = curves_of(
+        inputs, radii=radii, centre=centre, polygon=polygon, deformed=deformed, chosen_at=chosen_at, drawn=drawn,
+        progress=progress,
+    )  # fmt: skip
+    record.cost |= found.cost
+    record.warnings = found.headline["warnings"]
+    with together():
+        if steps_picture is not None:
+            from graben.stages.show.outline_steps import save_steps
+
+            save_steps(steps_picture, found.jobs[0][0].history, found.averages[0].outline, found.jobs[0][1])
+        if vtk:
+            _write_vtk(output, found.jobs, found.averages)
+        write_whole(output, LAYOUT, found.arrays, record, found.attributes)
+    return found.headline
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Averages, of which nothing is written.
+
+    headline : numbers, as `run` returns them; arrays, attributes, cost : of the artifact
+    jobs, averages : run and region of each path, and what was averaged (blocks)
+    """
+
+    headline: dict[str, Any]
+    arrays: dict[str, Any]
+    attributes: dict[str, Any]
+    cost: dict[str, Any] = field(default_factory=dict)
+    jobs: Sequence[tuple[Run, Rev]] = ()
+    averages: Sequence[Average] = ()
+
+
+def curves_of(
+    inputs: Sequence[Path],
+    *,
+    radii: Sequence[float] = (),
+    centre: Sequence[float] | None = None,
+    polygon: Sequence[Point] = (),
+    deformed: bool = False,
+    chosen_at: int = 0,
+    drawn: str = "",
+    progress: Progress = silent,
+) -> Curves:
+    """Average each run over each REV; parameters and errors as in `run`.
+
+    drawn : name of the argument that asks for a picture, which spheres have none of
+    """
+    _either(radii, polygon)
     kinds = [kind_of(path) for path in _existing(inputs)]
     if "particles" in kinds:
-        drawn = "steps" if steps_picture is not None else "vtk" if vtk else ""
-        return _spheres(inputs, kinds, output, radii, centre, deformed, chosen_at, drawn, progress)
+        return _spheres(inputs, kinds, radii, centre, deformed, chosen_at, drawn, progress)
     if centre is not None and len(centre) != 2:
         raise BadInput(Fault("homogenize", "centre", f"{len(centre)} lengths", "x, y for blocks", True))
-    record = Record.begin(None, inputs=inputs)
     jobs, faults = _jobs(inputs, radii, centre, polygon, chosen_at, progress)
     if faults:
         raise BadInput(faults)
@@ -97,7 +146,7 @@ def run(
         progress(0.2 + 0.8 * k / len(jobs), f"averaging {source.path.name} over {rev.radius:g} m")
         averages.append(average(source.history, rev, deformed, chosen_at))
     arrays = curve_arrays(jobs, averages)
-    record.cost |= {
+    cost = {
         "zones": sum(int(a.outline.blocks[j[0].history.zone_block].sum()) for j, a in zip(jobs, averages)),
         "states": int(max(a.stress.shape[0] for a in averages)),
         "strain_closure": max(a.strain_closure for a in averages),
@@ -110,19 +159,16 @@ def run(
         "outline_chosen_at": chosen_at,
         "stress_from": "zones, and the forces on blocks without zones" if rigid else "zones",
     }
-    record.warnings = warnings_of(_measures(record.cost))
-    with together():
-        if steps_picture is not None:
-            from graben.stages.show.outline_steps import save_steps
-
-            save_steps(steps_picture, jobs[0][0].history, averages[0].outline, jobs[0][1])
-        if vtk:
-            _write_vtk(output, jobs, averages)
-        write_whole(output, LAYOUT, arrays, record, attributes)
-    return {
+    headline = {
         "paths": [_headline(str(arrays["path_name"][k]), j, a) for k, (j, a) in enumerate(zip(jobs, averages))],
-        "warnings": record.warnings,
+        "warnings": warnings_of(_measures(cost)),
     }
+    return Curves(headline, arrays, attributes, cost, jobs, averages)
+
+
+def _either(radii: Sequence[float], polygon: Sequence[Point]) -> None:
+    if bool(radii) == bool(polygon):
+        raise BadInput(Fault("homogenize", "radius", "", "either a `radius` or a `polygon`", True))
 
 
 def _measures(cost: dict[str, Any]) -> list[Measure]:
@@ -138,14 +184,13 @@ def _measures(cost: dict[str, Any]) -> list[Measure]:
 def _spheres(
     inputs: Sequence[Path],
     kinds: Sequence[str],
-    output: Path,
     radii: Sequence[float],
     centre: Sequence[float] | None,
     deformed: bool,
     chosen_at: int,
-    pictures: str,
+    drawn: str,
     progress: Progress,
-) -> dict[str, Any]:
+) -> Curves:
     from graben.stages import homogenize_spheres
 
     faults = [
@@ -155,15 +200,17 @@ def _spheres(
     ]
     if not radii:
         faults.append(Fault("homogenize", "polygon", "", "a `radius`: spheres are averaged over balls", True))
-    if deformed or pictures:
-        name = "deformed" if deformed else pictures
+    if deformed or drawn:
+        name = "deformed" if deformed else drawn
         expected = "blocks: spheres have no outline, and a ball goes with them"
         faults.append(Fault("homogenize", name, "", expected, True))
     if centre is not None and len(centre) != 3:
         faults.append(Fault("homogenize", "centre", f"{len(centre)} lengths", "x, y, z for spheres", True))
     if faults:
         raise BadInput(faults)
-    return homogenize_spheres.run(inputs, output, radii=radii, centre=centre, chosen_at=chosen_at, progress=progress)
+    return Curves(
+        *homogenize_spheres.curves_of(inputs, radii=radii, centre=centre, chosen_at=chosen_at, progress=progress)
+    )
 
 
 def _existing(inputs: Sequence[Path]) -> list[Path]:

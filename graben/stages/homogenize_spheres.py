@@ -16,9 +16,7 @@ import xarray
 from graben.errors import BadInput, Fault
 from graben.mechanics.averaging.spheres import best_fit_gradient, love_weber
 from graben.schemas.artifact import read_artifact
-from graben.schemas.layouts.curves import LAYOUT
-from graben.stages.last_good import write_whole
-from graben.stages.record import Progress, Record
+from graben.stages.record import Progress
 
 _AXES = (0, 2, 1)
 _FEWEST = 10  # spheres whose motion still makes a strain
@@ -51,16 +49,15 @@ class _Bed:
     whole_forces: bool
 
 
-def run(
+def curves_of(
     inputs: Sequence[Path],
-    output: Path,
     *,
     radii: Sequence[float],
     centre: Sequence[float] | None,
     chosen_at: int,
     progress: Progress,
-) -> dict[str, Any]:
-    """Curves of every bed of every input over every ball; see `homogenize.run`.
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """Headline numbers, arrays and attributes of the curves of every bed over every ball; see `homogenize`.
 
     centre : x, y, z m; the middle of the bed at the end unless given
     chosen_at : step of the curve (0: settled) at which spheres are said to lie in the ball
@@ -69,7 +66,6 @@ def run(
     ------
     BadInput : faults of the inputs, a ball beyond its bed, or one with fewer than ten spheres
     """
-    record = Record.begin(None, inputs=inputs)
     beds: list[_Bed] = []
     faults: list[Fault] = []
     for path in inputs:
@@ -117,12 +113,12 @@ def run(
         "outline_chosen_at": chosen_at,
         "forces": "all, at every state" if whole else "normal forces between spheres, at the last state only",
     }
-    write_whole(output, LAYOUT, arrays, record, attributes)
-    return {
+    headline = {
         "paths": [_headline(n, p) for n, p in zip(names, paths)],
         "forces": attributes["forces"],
-        "warnings": record.warnings,
+        "warnings": [],
     }
+    return headline, arrays, attributes
 
 
 def _headline(name: str, path: tuple[_Bed, float, dict[str, Any]]) -> dict[str, Any]:

@@ -69,6 +69,17 @@ def read_files(paths: Iterable[str | Path], reading: Reading) -> list[Measured]:
     return found
 
 
+def curve_of(name: str, stress: np.ndarray, strain: np.ndarray, reading: Reading) -> Curve:
+    """A curve from arrays (steps, 4) of stress in Pa and strain, tension positive; BadInput names each fault."""
+    steps = len(stress)
+    faults = _check(
+        Path("curves"), name, [f"step {i}" for i in range(steps)], np.arange(steps), stress, strain, reading
+    )
+    if faults:
+        raise BadInput(faults)
+    return _curve(name, stress, strain, reading.test)
+
+
 def _told_apart(found: list[Measured]) -> list[Measured]:
     """Curves of one name numbered, within a file and over files."""
     names = [c.name for part in found for c in part.curves]
@@ -134,7 +145,7 @@ def _check(path: Path, name: str, rows: list[str], time: np.ndarray, stress: np.
     if pulls and not reading.allow_tension:
         found = f"mean stress_xx {lateral:.4g} Pa, largest stress_yy {axial:.4g} Pa read as tension positive"
         expected = (
-            "compression below zero: the file seems to be compression-positive (csv.sign; csv.allow_tension = true "
+            "compression below zero: the curve seems to be compression-positive (csv.sign; csv.allow_tension = true "
             "if it does pull)"
         )
         faults.append(Fault(file, f"curve {name}, sign", found, expected))

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from graben.errors import Refused
+
 # Spacing of the samples along a line, as a part of the smallest size that can occur on it.
 _SAMPLES_PER_ELEMENT = 8
 
@@ -29,7 +31,7 @@ class SizeField:
 
     def __post_init__(self) -> None:
         if not self.size > 0 or np.any(np.asarray(self.near_size) <= 0) or np.any(np.asarray(self.growth) < 0):
-            raise ValueError("element sizes must be positive and growth not negative")
+            raise Refused("element sizes must be positive and growth not negative")
         if len(self.segments) != len(self.near_size) or len(self.segments) != len(self.growth):
             raise ValueError("segments, near_size and growth must have one entry per refinement")
 
