@@ -1,5 +1,6 @@
 """Small real artifacts that several tests read; each is made once per session by the command that makes it."""
 
+import logging
 from pathlib import Path
 
 import hypothesis
@@ -35,6 +36,15 @@ def made(*arguments):
     result = command(*arguments)
     assert result.exit_code == 0, result.output
     return result
+
+
+@pytest.fixture(autouse=True)
+def level_of_the_log():
+    """Commands set it with -q and -v: what one test asks for is not what the next one gets."""
+    log = logging.getLogger()
+    before = log.level
+    yield
+    log.setLevel(before)
 
 
 @pytest.fixture(scope="session")

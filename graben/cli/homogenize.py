@@ -28,6 +28,15 @@ def _point(text: str, argument: str) -> tuple[float, float]:
     return _length(parts[0], argument), _length(parts[1], argument)
 
 
+def _corners(text: str) -> list[tuple[float, float]]:
+    from graben.errors import BadInput, Fault
+
+    corners = [_point(p, "polygon") for p in text.split(";") if p.strip()]
+    if len(corners) < 3:
+        raise BadInput(Fault("homogenize", "polygon", repr(text), "at least three corners", True))
+    return corners
+
+
 def _centre(text: str) -> tuple[float, ...]:
     if text.count(",") == 2:
         return tuple(_length(part, "centre") for part in text.split(","))
@@ -70,13 +79,13 @@ def main(
     """
     from graben.stages import homogenize
 
-    corners = [_point(p, "polygon") for p in polygon.split(";") if p.strip()] if polygon else []
+    corners = _corners(polygon) if polygon is not None else []
     with session.progress() as progress:
         headline = homogenize.run(
             inputs,
             output,
             radii=[_length(r, "radius") for r in radii],
-            centre=_centre(centre) if centre else None,
+            centre=_centre(centre) if centre is not None else None,
             polygon=corners,
             deformed=deformed,
             chosen_at=chosen_at,

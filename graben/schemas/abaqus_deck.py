@@ -165,7 +165,7 @@ class _Reader:
 
 def _sections(text: str) -> Iterator[tuple[str, dict[str, str], list[tuple[list[str], bool]], int]]:
     """Keyword, options (names in capitals), data rows and line number of every keyword of a deck."""
-    lines = text.splitlines()
+    lines = [line.strip() for line in text.splitlines()]  # a keyword may stand behind blanks
     starts = [k for k, line in enumerate(lines) if line.startswith("*") and not line.startswith("**")]
     for start, end in zip(starts, [*starts[1:], len(lines)]):
         first = start + 1
@@ -183,7 +183,8 @@ def _sections(text: str) -> Iterator[tuple[str, dict[str, str], list[tuple[list[
 
 
 def _text(path: Path) -> str:
-    return read_bytes(path, "mesh file").decode("latin-1")  # comments may be in any encoding
+    data = read_bytes(path, "mesh file").removeprefix(b"\xef\xbb\xbf")
+    return data.decode("latin-1")  # comments may be in any encoding
 
 
 def _data(lines: list[str]) -> Iterator[tuple[list[str], bool]]:

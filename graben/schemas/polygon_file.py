@@ -61,13 +61,17 @@ def _geojson(path: Path) -> Polygons:
     found = Polygons([], [], [], [])
     faults: list[Fault] = []
     try:
-        _refuse_degrees(data)
         features = list(_features(data))
     except _Wrong as wrong:
         raise BadInput(Fault(str(path), *wrong.args)) from None
     for name, geometry, properties in features:
         try:
             _add(found, name, geometry, properties)
+        except _Wrong as wrong:
+            faults.append(Fault(str(path), *wrong.args))
+    if not faults:
+        try:
+            _refuse_degrees(data, found.rings)
         except _Wrong as wrong:
             faults.append(Fault(str(path), *wrong.args))
     if faults:
@@ -81,12 +85,15 @@ class _Wrong(Exception):
     """Key, value and what was expected."""
 
 
-def _refuse_degrees(data: Any) -> None:
-    """Geographic systems (CRS84, and those of EPSG from 4000 to 4999) count in degrees."""
+def _refuse_degrees(data: Any, rings: list[np.ndarray]) -> None:
+    """Geographic systems count in degrees: CRS84, and most of EPSG from 4000 to 4999. Some of these are grids in
+    metres, whose coordinates are too large for degrees."""
     crs = data.get("crs") if isinstance(data, dict) else None
     properties = crs.get("properties") if isinstance(crs, dict) else None
-    name = str(properties.get("name")) if isinstance(properties, dict) else ""
-    if re.search(r"CRS:?84$|EPSG:.*\b4\d{3}$", name, re.IGNORECASE):
+    name = str(properties.get("name")) if isinstance(properties, dict) else crs if isinstance(crs, str) else ""
+    known = re.search(r"CRS:?84$|WGS ?84$|EPSG:.*\b(4326|4258|4269|6318|6668|6706|7844)$", name, re.IGNORECASE)
+    most = re.search(r"EPSG:.*\b4\d{3}$", name, re.IGNORECASE)
+    if known or (most and all((np.abs(ring) <= 360.0).all() for ring in rings)):
         raise _Wrong("crs", name, "a projected grid in metres (this one is in degrees)")
 
 

@@ -33,7 +33,7 @@ _LONGEST = 80
 
 # What has one meaning is taken: signs that typesetters use for ASCII ones.
 _SIGNS = str.maketrans(
-    {"\u2212": "-", "\u00b5": "u", "\u03bc": "u", "\u00b7": "*", "\u22c5": "*", "\u00b0": "deg"}
+    {"\u2212": "-", "\u00b5": "u", "\u03bc": "u", "\u00b7": "*", "\u22c5": "*", "\u00b0": "deg", "\u00ba": "deg"}
     | dict.fromkeys("\u00a0\u2007\u2009\u202f", " ")
 )
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
@@ -62,8 +62,8 @@ standard_gravity = 9.80665 * meter / second ** 2
 kilogram_force = kilogram * standard_gravity = kgf
 tonne_force = tonne * standard_gravity = tf
 atmosphere = 101325 * pascal = atm
-inch = 0.0254 * meter = in
-foot = 12 * inch = ft
+inch = 0.0254 * meter = in = inches
+foot = 12 * inch = ft = feet
 pound = 0.45359237 * kilogram = lb
 pound_force = pound * standard_gravity = lbf
 kip = 1000 * pound_force
@@ -116,9 +116,14 @@ def plain_number(text: str) -> float:
     text = text.translate(_SIGNS).strip()
     if len(text) > _LONGEST or not re.fullmatch(_NUMBER, text):
         raise Refused("one plain number, such as 0.5 or 2e-3: a decimal point, no thousands separators")
+    return _finite(text)
+
+
+def _finite(text: str) -> float:
+    """The float of a plain number that is neither too large nor too small for one."""
     value = float(text)
-    if not math.isfinite(value):
-        raise Refused("a finite number")
+    if not math.isfinite(value) or (value == 0.0 and re.search("[1-9]", re.split("[eE]", text)[0])):
+        raise Refused(f"a finite number; {text} is too {'small' if value == 0.0 else 'large'}")
     return value
 
 
@@ -141,10 +146,11 @@ def to_si(text: Any, unit: str, *, tiny: bool = False) -> float:
     match = _QUANTITY.fullmatch(plain) if len(plain) <= _LONGEST else None
     if match is None:
         raise Refused(f"{wanted}; {_cure(plain, unit)}")
-    value = float(match[1]) * _factor(re.sub(r"\s", "", match[2]), unit, wanted)
+    number = _finite(match[1])
+    value = number * _factor(re.sub(r"\s", "", match[2]), unit, wanted)
     if not abs(value) <= largest:
         raise Refused(f"{wanted}, finite and at most {largest:g} {unit}")
-    if value and abs(value) < smallest and not tiny:
+    if number and abs(value) < smallest and not tiny:
         raise Refused(f"{wanted}, 0 or of at least {smallest:g} {unit}")
     return value
 
@@ -158,7 +164,7 @@ def _cure(text: str, unit: str) -> str:
         return f"write {text.replace(',', '.')} or {text.replace(',', '')}: a decimal point, no thousands separators"
     if re.fullmatch(_NUMBER, text):
         return f"{text} has no unit" + (f" ({_ANGULAR[unit]})" if unit in _ANGULAR else "")
-    if re.match(r"[+-]?[0-9]+([.,'_\s][0-9]+)+", text):
+    if re.match(r"[+-]?[0-9]+([.,'_\s][0-9]+)+", text) and not re.match(rf"{_NUMBER}\s*[A-Za-z]", text):
         return "write one number, with a decimal point and no thousands separators, and one unit"
     if re.search(r"[A-Za-z][2-9]", text):
         return "write powers as in m^2"
@@ -202,7 +208,7 @@ def _registry() -> tuple[Any, frozenset[str]]:
     symbols = [s for s, _ in _PREFIXES.values()]
     names = [*_NAMES, *_NAMES_WITH_PREFIX, *(p + n for p in _PREFIXES for n in _NAMES_WITH_PREFIX)]
     spelled = [*_SYMBOLS, *_SYMBOLS_WITH_PREFIX, *(p + s for p in symbols for s in _SYMBOLS_WITH_PREFIX)]
-    return registry, frozenset([*spelled, *names, *(n + "s" for n in names), "inch", "foot"])
+    return registry, frozenset([*spelled, *names, *(n + "s" for n in names), "inch", "inches", "foot", "feet"])
 
 
 def _quantity(unit: str) -> Any:

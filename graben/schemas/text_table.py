@@ -18,6 +18,7 @@ SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "pipe", " ": "bl
 _SEARCHED = 500  # lines in which the header must stand
 _LARGEST = 256 * 2**20  # bytes
 _SHOWN = 5  # faults of one kind
+SPREADSHEET = ("#n/a", "#na", "#nv", "#div/0!", "#value!", "#wert!", "#ref!", "#num!", "#zahl!", "#name?", "#null!")
 _FOREIGN = (
     (b"PK\x03\x04", "a spreadsheet or another packed file"),
     (b"\xd0\xcf\x11\xe0", "an old spreadsheet or document"),
@@ -80,7 +81,7 @@ def read_text_table(path: Path, understood: Callable[[str], bool], expected: str
         )
     at, separator, titles = found
     width = len(titles)
-    comments = [bool(line.lstrip().startswith("#")) for line in lines]
+    comments = [_is_comment(line) for line in lines]
     body = ["" if comment or i < at else line for i, (line, comment) in enumerate(zip(lines, comments, strict=True))]
     body[at] = lines[at].lstrip().lstrip("#")
     reader = _split(body[at:], separator)
@@ -114,6 +115,12 @@ def read_text_table(path: Path, understood: Callable[[str], bool], expected: str
         titles, rows, encoding, " and ".join(kinds), SEPARATORS[separator], first_row, at - sum(comments[:at]),
         sum(comments) - comments[at], empty,
     )  # fmt: skip
+
+
+def _is_comment(line: str) -> bool:
+    """Lines that begin with #, but not with a word that a spreadsheet writes where a number is missing."""
+    text = line.lstrip().lower()
+    return text.startswith("#") and not text.startswith(SPREADSHEET)
 
 
 def _decoded(path: Path) -> tuple[str, str]:
@@ -166,7 +173,7 @@ def _header(lines: list[str], understood: Callable[[str], bool]) -> tuple[int, s
         best, found = 1, None
         for i, line in enumerate(lines[:_SEARCHED]):
             bare = line.lstrip()
-            if bare.startswith("#") != commented or not bare:
+            if _is_comment(line) != commented or not bare:
                 continue
             for separator in SEPARATORS:
                 # a title in quotes may run over lines

@@ -16,6 +16,7 @@ from graben.mechanics.blocks import coverage
 from graben.mechanics.blocks.compression import rectangle_sides
 from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets
 from graben.mechanics.blocks.mending import mend
+from graben.mechanics.blocks.polygons import signed_area
 from graben.mechanics.blocks.tessellation import Tessellation, voronoi_blocks, without
 from graben.mechanics.local_frame import local_origin
 from graben.mechanics.rings import refuse_crossing, turning_corners
@@ -28,6 +29,8 @@ _log = logging.getLogger(__name__)
 _MENDED = 0.1
 # A joint of a map that turns by more is worth a warning [rad].
 _WARN_TURN = np.radians(1.0)
+# So does a larger share of the area in blocks that joined their neighbours.
+_WARN_AREA = 0.05
 _MOST_FAULTS = 10
 
 # Arrays of the artifact that are places; all others are differences of places, or no lengths.
@@ -83,6 +86,7 @@ def lay_out(scene: BlocksScene) -> Ground:
         raise BadInput(Fault(str(scene.source.path), "tessellation", t.method, str(error))) from error
     if scene.programme is None:
         _refuse_other_shapes(scene, blocks)
+    _warn_of_mending(scene, blocks)
     return Ground(local, blocks, origin, mended | _moved(blocks))
 
 
@@ -159,14 +163,23 @@ def _of_map(
     if sound.corners:
         mended |= {"snapped_corners": sound.corners, "largest_snap_m": sound.largest_move}
         _log.warning("%s: %d corners snapped, by up to %.3g m", t.file, sound.corners, sound.largest_move)
-    m = blocks.mending
-    if m is not None and (m.largest_turn > _WARN_TURN or m.blocks):
+    return blocks, mended
+
+
+def _warn_of_mending(scene: BlocksScene, blocks: Tessellation) -> None:
+    """Of a map whatever was mended; between joint sets slivers are usual, and only much area is worth a word."""
+    m, t = blocks.mending, scene.tessellation
+    if m is None:
+        return
+    share = m.area / signed_area(blocks.outline)
+    if share > _WARN_AREA or (t.method == "file" and (m.largest_turn > _WARN_TURN or m.blocks)):
         _log.warning(
             "%s: to mend short edges and slivers (tessellation.shortest_edge, tessellation.thinnest), %d corners "
-            "moved by up to %.3g m, %d joints turned by up to %.3g deg, and %d blocks joined their neighbours",
-            t.file, m.corners, m.largest_move, m.joints, np.degrees(m.largest_turn), m.blocks,
+            "moved by up to %.3g m, %d joints turned by up to %.3g deg, and %d blocks with %.2g of the area joined "
+            "their neighbours",
+            t.file or scene.source.path, m.corners, m.largest_move, m.joints, np.degrees(m.largest_turn), m.blocks,
+            share,
         )  # fmt: skip
-    return blocks, mended
 
 
 def _refuse_other_size(scene: BlocksScene, found: Polygons, size: np.ndarray, sized: set[str], snap: float) -> None:

@@ -24,6 +24,7 @@ _TESTS = {"plane-strain": ("seee", "ssee", (1,)), "triaxial": ("sese", "ssse", (
 _ONE_LATERAL = 0.1  # of the largest stress: further apart, two lateral stresses are not one
 _HOLES = 0.1  # of a test's rows may lack a number
 _UNIT = 0.5  # a strain without a unit that reaches this may be in percent
+_WORTH_A_WORD = 0.02  # a fraction that large, if its unit is not said
 _LOADED = 0.1  # of a curve's largest deviator, where it begins: worth a word
 
 
@@ -267,7 +268,9 @@ def _table(path: Path, reading: Reading) -> Measured:
             tests.append(about)
     if faults:
         raise BadInput(faults)
-    read = _dialect(table, columns, int((~complete).sum()), repeated) | {"sign": reading.sign, "tests": tests}
+    bare = {columns.titles[m]: _largest(curves, AXES.index(m[7:])) for m in columns.without_unit}
+    read = _dialect(table, columns, int((~complete).sum()), repeated)
+    read |= {"strains_without_unit": bare, "sign": reading.sign, "tests": tests}
     _tell(path, read)
     return Measured(file, curves, read)
 
@@ -296,6 +299,10 @@ def _percent(file: str, columns: Columns, name: str, strain: np.ndarray) -> list
                 Fault(file, f"curve {name}, {columns.titles[meaning]}", f"up to {top:g} without a unit", expected)
             )
     return faults
+
+
+def _largest(curves: list[Curve], axis: int) -> float:
+    return max((float(np.nanmax(np.abs(since_first(c.strain[:, axis])), initial=0.0)) for c in curves), default=0.0)
 
 
 def _dialect(table: TextTable, columns: Columns, dropped: int, repeated: int) -> dict[str, Any]:
@@ -332,6 +339,11 @@ def _tell(path: Path, read: dict[str, Any]) -> None:
         for key, words in (("dropped_rows", "rows that lack a number"), ("repeated_rows", "rows said twice"))
         if read[key]
     ]
+    for title, top in read["strains_without_unit"].items():
+        if top > _WORTH_A_WORD:
+            _log.warning(
+                "%s: %s has no unit and is read as a fraction, up to %.3g (%.3g %%)", path, title, top, 100.0 * top
+            )
     if read["ignored_columns"]:
         left.append("columns " + ", ".join(read["ignored_columns"]))
     if left:

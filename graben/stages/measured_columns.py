@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from graben.errors import BadInput, Fault
-from graben.schemas.text_table import TextTable
+from graben.schemas.text_table import SPREADSHEET, TextTable
 
 AXES = ("xx", "yy", "zz", "xy")
 NEEDED = ("stress_yy", "stress_xx", "strain_yy", "strain_xx")
@@ -45,7 +45,7 @@ _NONE = {"": 1.0, "-": 1.0, "1": 1.0}
 _LISTED = {"stress": "Pa, kPa, MPa, GPa, N/mm2, kN/m2, bar", "strain": "1, mm/mm, percent, %, permille, microstrain",
            "time": "s, ms, min, h"}  # fmt: skip
 _LISTED["confining"] = _LISTED["stress"]
-_MISSING = {"", "-", "--", "nan", "n/a", "na", "#n/a", "#na", "#nv", "null", "none", "missing"}
+_MISSING = {"", "-", "--", "nan", "n/a", "na", "null", "none", "missing", *SPREADSHEET}
 _SHOWN = 5
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
@@ -220,7 +220,8 @@ def _factor_of(
     if strain:
         return 1.0, False
     example = "_".join((meaning, "s" if meaning == "time" else "pa"))
-    return Fault(file, title, "", f"a unit at the end of its name, or in a row below it, such as {example}")
+    leave = "; a column of dates or clock times is not needed: leave it out" if meaning == "time" else ""
+    return Fault(file, title, "", f"a unit at the end of its name, or in a row below it, such as {example}{leave}")
 
 
 def _decimal_mark(

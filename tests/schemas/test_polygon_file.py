@@ -121,10 +121,19 @@ def test_anything_else_is_refused_by_feature_and_place(tmp_path, geometry, words
         ({"type": "Topology", "objects": {}}, "list of coordinates"),
         (feature(polygon(SQUARE), crs={"properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}}), "degrees"),
         (feature(polygon(SQUARE), crs={"properties": {"name": "EPSG:4326"}}), "degrees"),
+        (feature(polygon(SQUARE), crs={"properties": {"name": "urn:ogc:def:crs:EPSG::4283"}}), "degrees"),
+        (feature(polygon(SQUARE), crs={"properties": {"name": "urn:ogc:def:crs:EPSG::7844"}}), "degrees"),
+        (feature(polygon(SQUARE), crs="EPSG:4326"), "degrees"),
     ],
 )
 def test_files_that_are_no_maps(tmp_path, data, words):
     assert words in fault(tmp_path, data)
+
+
+def test_grids_in_metres_among_the_numbers_of_geographic_systems_are_read(tmp_path):
+    grid = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::4647"}}  # UTM 32N with the zone before
+    ring = [[32_412_000.0 + x, 5_800_000.0 + y] for x, y in SQUARE]
+    assert len(read(tmp_path, feature(polygon(ring), crs=grid)).rings) == 1
 
 
 def test_every_fault_of_a_map_is_named_but_not_thousands(tmp_path):

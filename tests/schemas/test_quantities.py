@@ -66,6 +66,10 @@ def test_quantities_become_si(text, unit, value):
         ("1e400 Pa", "Pa", "finite"),
         ("1e30 m", "m", "at most"),
         ("1e-300 m", "m", "at least"),
+        ("3e-400 m", "m", "too small"),
+        ("5e-324 nm", "m", "at least"),
+        ("9.81 m/s2", "m/s^2", "powers as in"),
+        ("9.81 m s^-2", "m/s^2", "between the unit's parts"),
         ("", "Pa", "quantity in Pa"),
         ("two metres", "m", "quantity in m"),
         ("__import__('os')", "m", "quantity in m"),
@@ -122,7 +126,9 @@ def test_what_is_no_such_quantity_is_refused_with_what_was_expected(text, unit, 
     assert time.monotonic() - begun < 30.0  # a power tower would never end
 
 
-@pytest.mark.parametrize("text", ["0,5", "1 000", "1_0", "nan", "inf", "1e999", "\uff12", "0x1", "1/2", "9" * 500])
+@pytest.mark.parametrize(
+    "text", ["0,5", "1 000", "1_0", "nan", "inf", "1e999", "1e-999", "\uff12", "0x1", "1/2", "9" * 500]
+)
 def test_plain_numbers_alone_are_numbers(text):
     with pytest.raises(Refused):
         plain_number(text)

@@ -129,10 +129,12 @@ def test_formats_hold_the_same_body_and_lines_are_left_out(tmp_path, name, optio
         (deck(after=["*Nset, nset=L", "10, 20", "*Elset, elset=TOP", "500, 502", "*Elset, elset=B", "TOP"]), None),
         (deck(after=["*Material, name=M", "*Elastic", "1e8, 0.3", "*Step", "*Node Output", "U", "*End Step"]), None),
         (deck().replace("*Element", "*Node\n10, 0., 0., 0.\n*Element"), None),
+        (deck().replace("*Element", "*Nset, nset=L\n10, 20\n  *Element"), None),  # blanks before a keyword
+        ("\ufeff" + deck(), None),
     ],
 )  # fmt: skip
 def test_decks_in_the_dialects_that_people_have(tmp_path, text, words):
-    (tmp_path / "deck.inp").write_text(text)
+    (tmp_path / "deck.inp").write_text(text, encoding="utf-8")
     result = run(tmp_path, "deck.inp")
     np.testing.assert_allclose(settlement(result), SETTLEMENT, rtol=1e-9)
     notes = json.loads(result.stdout).get("mesh_notes", [])

@@ -213,6 +213,9 @@ def test_command_line(folder, tmp_path):
     assert json.loads(result.output)["paths"][0]["area_m2"] > 7.0
     bad = CliRunner().invoke(main, [*call[:1], "--radius", "4 MPa", "-o", str(tmp_path / "y.nc")])
     assert bad.exit_code == 2 and "--radius" in bad.output and not (tmp_path / "y.nc").exists()
+    for option, text in (("--polygon", ""), ("--polygon", "1 m,1 m; 9 m,1 m"), ("--centre", "")):
+        bad = CliRunner().invoke(main, [*call[:3], option, text, "-o", str(tmp_path / "y.nc")])
+        assert bad.exit_code == 2 and option in bad.output  # an empty one is no option left out
     assert CliRunner().invoke(main, call).exit_code == 2
 
 

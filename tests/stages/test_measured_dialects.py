@@ -236,7 +236,7 @@ def test_a_number_of_two_meanings_is_refused_with_both(tmp_path):
     assert curve.stress[:, 1].tolist() == [-1500.0, -2500.0, -3500.0]
 
 
-@pytest.mark.parametrize("word", ["", "nan", "NaN", "-", "n/a", "NA", "#N/A"])
+@pytest.mark.parametrize("word", ["", "nan", "NaN", "-", "n/a", "NA", "#N/A", "#DIV/0!"])
 def test_a_row_without_a_number_is_left_out_and_counted(tmp_path, word, caplog):
     (part,) = read_files([put(tmp_path, text(data=changed(5, 2, word)))], COMPRESSION)
     assert part.read["dropped_rows"] == 1 and [len(c.stress) for c in part.curves] == [11, 12]
@@ -246,6 +246,25 @@ def test_a_row_without_a_number_is_left_out_and_counted(tmp_path, word, caplog):
     message = faults(tmp_path, text(data=data))
     assert "curve R 1, row 7, stress_yy_kpa" in message and "row 9, strain_yy_percent" in message
     assert "2 of 12 rows" in message
+
+
+def test_a_row_that_begins_with_an_error_of_a_spreadsheet_is_no_comment(tmp_path):
+    titles = ["stress_yy_kpa", "stress_xx_kpa", "strain_yy_percent", "strain_xx_percent"]
+    data = [[1200.5 + i, 1200.5, 0.5 * i, -0.1 * i] for i in range(12)]
+    data[4][0] = "#N/A"
+    (part,) = read_files([put(tmp_path, text(titles, data=data))], COMPRESSION)
+    assert part.read["comment_rows"] == 0 and part.read["dropped_rows"] == 1
+    data[5][0] = data[6][0] = "#VALUE!"
+    assert "3 of 12 rows" in faults(tmp_path, text(titles, data=data))
+
+
+def test_a_strain_without_a_unit_that_may_be_in_percent_is_told(tmp_path, caplog):
+    titles = ["stress_yy_kpa", "stress_xx_kpa", "strain_yy", "strain_xx"]
+    data = [[1200.5 + i, 1200.5, 0.03 * i, -0.001 * i] for i in range(12)]
+    (part,) = read_files([put(tmp_path, text(titles, data=data))], COMPRESSION)
+    assert part.read["strains_without_unit"] == pytest.approx({"strain_yy": 0.33, "strain_xx": 0.011})
+    assert "strain_yy has no unit and is read as a fraction, up to 0.33 (33 %)" in caplog.text
+    assert "strain_xx has no unit" not in caplog.text
 
 
 def test_a_row_said_twice_counts_once(tmp_path, wanted):

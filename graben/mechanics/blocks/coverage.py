@@ -2,7 +2,8 @@
 
 The rule for small faults: a map with any fault is snapped once, and what remains is refused. Corners closer than
 `SNAP` of the median edge to each other meet; those closer to an edge of another polygon, or to the domain's outline,
-go onto it. A map without faults stays as it is.
+go onto it. A map without faults stays as it is. Where coordinates have few decimals, corners miss edges by more:
+corners go onto edges within `_STEPS` of the last decimal.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ from graben.mechanics.rings import place, refuse_crossing
 
 # Corners that miss each other, or an edge, by less than this share of the median edge are meant to meet.
 SNAP = 1e-3
+# Rounding to a step moves a corner by up to 0.71 steps, and an edge that it should lie on by as much the other way.
+# Steps above that share of the median edge are taken for numbers that happen to be round.
+_STEPS, _COARSEST = 1.5, 0.02
 # A slit that opens to the outside and is narrower than this share of the median edge is a gap between polygons.
 SLIT = 0.05
 # Corners as close as this share of the map's extent are one; digits of coordinates.
@@ -79,8 +83,21 @@ def sound(given: Given) -> Snapped:
     faults = _faults(given, rings, equal, typical)
     if not faults and equal <= _EQUAL * extent:
         return Snapped(rings, sets)
-    rings, sets, corners, largest = _snap(given, max(SNAP * typical, equal), equal)
+    reach = max(SNAP * typical, equal)
+    beside = max(reach, _STEPS * _rounding(given, _COARSEST * typical))
+    rings, sets, corners, largest = _snap(given, reach, beside, equal)
     return Snapped(rings, sets, corners, largest, _faults(given, rings, equal, typical))
+
+
+def _rounding(given: Given, coarsest: float) -> float:
+    """The decimal step, at most `coarsest` [m], of which all coordinates are multiples; 0 where there is none."""
+    values = np.vstack(given.rings) + given.origin
+    digits = 4.0 * np.spacing(np.abs(values).max())
+    for step in (10.0**n for n in range(3, -7, -1)):
+        fits = 4.0 * digits < step <= coarsest
+        if fits and np.abs(values - step * np.rint(values / step)).max() <= digits:
+            return step
+    return 0.0
 
 
 def _without_repeats(rings, sets, equal: float) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -89,8 +106,9 @@ def _without_repeats(rings, sets, equal: float) -> tuple[list[np.ndarray], list[
     return [r[k] for r, k in zip(rings, kept)], [s[k] for s, k in zip(sets, kept)]
 
 
-def _snap(given: Given, reach: float, equal: float):
-    """Rings, sets, number of corners that moved, largest move: corners within `reach` brought together."""
+def _snap(given: Given, reach: float, beside: float, equal: float):
+    """Rings, sets, corners that moved or bent an edge, largest move: corners within `reach` brought together, and
+    onto edges within `beside`."""
     ends = np.cumsum([len(r) for r in given.rings])[:-1]
     points = np.vstack(given.rings)
     number, _ = equal_points(points, reach)
@@ -99,45 +117,49 @@ def _snap(given: Given, reach: float, equal: float):
     order = np.lexsort((-np.bincount(same)[same], number))
     target = points[order[np.unique(number[order], return_index=True)[1]]]
     if given.domain is not None:
-        target = _onto(target, given.domain, reach)
+        target = _onto(target, given.domain, reach, beside)
     moved = target[number]
     rings, sets = [], []
     tree = cKDTree(target)
+    bent, bend = 0, 0.0
     for ring, mark in zip(np.split(moved, ends), given.sets, strict=True):
         ring, mark = (part[0] for part in _without_repeats([ring], [mark], equal))
         if len(ring):
-            ring, mark = _with_corners_beside(ring, mark, target, tree, reach, equal)
+            ring, mark, off = _with_corners_beside(ring, mark, target, tree, beside, equal)
+            bent, bend = bent + int((off > equal).sum()), max(bend, float(off.max(initial=0.0)))
         rings.append(ring)
         sets.append(mark)
     far = np.hypot(*(moved - points).T)
-    return rings, sets, int((far > equal).sum()), float(far.max())
+    return rings, sets, int((far > equal).sum()) + bent, max(float(far.max()), bend)
 
 
-def _onto(points: np.ndarray, domain: np.ndarray, reach: float) -> np.ndarray:
-    """Points within `reach` of the domain's outline (k, 2) moved onto it, onto its corners first."""
+def _onto(points: np.ndarray, domain: np.ndarray, reach: float, beside: float) -> np.ndarray:
+    """Points within `reach` of corners of the domain's outline (k, 2), or `beside` of its sides, moved onto them."""
     away, corner = cKDTree(domain).query(points)
     side = distance_to_sides(points, domain)
     k = side.argmin(axis=1)
     a, d = domain[k], np.roll(domain, -1, axis=0)[k] - domain[k]
     foot = a + ((((points - a) * d).sum(1) / (d * d).sum(1))[:, None]) * d
-    near = np.where((side.min(axis=1) < reach)[:, None], foot, points)
+    near = np.where((side.min(axis=1) < beside)[:, None], foot, points)
     return np.where((away < reach)[:, None], domain[corner], near)
 
 
 def _with_corners_beside(ring, sets, points, tree, reach: float, equal: float):
-    """A ring and its sets with the corners of others put in that lie within `reach` of its edges."""
-    whole, marks = [], []
+    """A ring and its sets with the corners of others put in that lie within `reach` of its edges, and how far off."""
+    whole, marks, bends = [], [], [np.zeros(0)]
     for a, b, mark in zip(ring, np.roll(ring, -1, axis=0), sets, strict=True):
         d = b - a
         length = float(np.hypot(*d))
         near = points[np.sort(tree.query_ball_point(0.5 * (a + b), 0.5 * length + reach))]
         along = (near - a) @ d / length
         off = np.abs((near - a)[:, 0] * d[1] - (near - a)[:, 1] * d[0]) / length
-        between = near[(off < reach) & (along > equal) & (along < length - equal)]
+        on = (off < reach) & (along > equal) & (along < length - equal)
+        bends.append(off[on])
+        between = near[on]
         between = between[np.argsort((between - a) @ d, kind="stable")]
         whole += [a, *between]
         marks += [mark] * (1 + len(between))
-    return np.array(whole), np.array(marks)
+    return np.array(whole), np.array(marks), np.concatenate(bends)
 
 
 def _faults(given: Given, rings: list[np.ndarray], equal: float, typical: float) -> list[Misfit]:

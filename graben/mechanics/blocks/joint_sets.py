@@ -39,16 +39,35 @@ def cut_by_sets(outline: np.ndarray, sets: list[JointSet], seed: int) -> list[Ma
     outline = np.asarray(outline, dtype=float)
     ring = outline if polygons.signed_area(outline) > 0.0 else outline[::-1].copy()
     blocks: list[Marked] = [(ring, np.zeros(len(ring), dtype=np.int64))]
+    corners, size = ring, np.array([len(ring)])
     for number, joints in enumerate(sets, start=1):
         for point, direction in _lines(outline, joints, rng):
-            left = []
-            for block in blocks:
-                pieces = split(block, point, direction, number)
+            left: list[Marked] = []
+            rings, sizes, done = [], [], 0
+            first = np.append(0, np.cumsum(size))
+            for k in _near(corners, size, point, direction):
+                pieces = split(blocks[k], point, direction, number)
                 # One draw for each block that is crossed, whatever the persistence.
-                crossed = len(pieces) > 1
-                left += pieces if crossed and rng.random() < joints.persistence else [block]
-            blocks = left
+                if len(pieces) > 1 and rng.random() < joints.persistence:
+                    left += blocks[done:k] + pieces
+                    rings += [corners[first[done] : first[k]], *(r for r, _ in pieces)]
+                    sizes += [size[done:k], [len(r) for r, _ in pieces]]
+                    done = k + 1
+            if done:
+                blocks = left + blocks[done:]
+                corners = np.vstack([*rings, corners[first[done] :]])
+                size = np.concatenate([*sizes, size[done:]]).astype(np.int64)
     return blocks
+
+
+def _near(corners: np.ndarray, size: np.ndarray, point: np.ndarray, direction: np.ndarray) -> list[int]:
+    """Numbers of the blocks that a line may cross; corners (n, 2) of all blocks in turn, size: how many each has."""
+    r = corners - point
+    side = direction[0] * r[:, 1] - direction[1] * r[:, 0]
+    first = np.cumsum(size) - size
+    hair = 1e-8 * float(np.abs(side).max())
+    crossed = (np.minimum.reduceat(side, first) < hair) & (np.maximum.reduceat(side, first) > -hair)
+    return np.flatnonzero(crossed).tolist()
 
 
 def _lines(outline: np.ndarray, joints: JointSet, rng: np.random.Generator):

@@ -33,6 +33,8 @@ from graben.mechanics.rings import STRAIGHT, refuse_crossing
 
 # A joint that turns by less has kept its direction [rad].
 _TURNED = np.radians(0.1)
+# A larger part of the area in blocks that mending takes away makes another rock of it.
+MOST_SLIM = 0.5
 
 
 def mend(
@@ -194,13 +196,19 @@ def _merge_slivers(points, rings, thinnest: float, smallest: float) -> dict[int,
     """The rings that are left, by the numbers of the given ones."""
     area = np.array([polygons.signed_area(points[r]) for r in rings])
     limit = smallest * float(np.median(area))
+    width = np.array([a / _longest(points[r]) for a, r in zip(area, rings)])
+    slim = float(area[width < thinnest].sum() / area.sum())
+    if slim > MOST_SLIM:
+        raise Refused(
+            f"blocks that mending leaves: {100.0 * slim:.0f} % of the area lies in blocks narrower than "
+            f"{thinnest:.4g} m, which join their neighbours; lower tessellation.thinnest, or widen the blocks"
+        )
     alive: dict[int, list[int]] = dict(enumerate(rings))
     owner = {edge: k for k, ring in alive.items() for edge in edges_of(ring)}
     for k in np.argsort(area, kind="stable").tolist():
         ring = alive[k]
         xy = points[ring]
-        longest = float(np.hypot(*(xy[:, None] - xy[None]).reshape(-1, 2).T).max())
-        if polygons.signed_area(xy) >= limit and polygons.signed_area(xy) >= thinnest * longest:
+        if polygons.signed_area(xy) >= limit and polygons.signed_area(xy) >= thinnest * _longest(xy):
             continue
         shared: dict[int, float] = defaultdict(float)
         for a, b in edges_of(ring):
@@ -219,6 +227,11 @@ def _merge_slivers(points, rings, thinnest: float, smallest: float) -> dict[int,
             del alive[k]
             break
     return {k: alive[k] for k in sorted(alive)}
+
+
+def _longest(xy: np.ndarray) -> float:
+    """Longest diagonal of corners (m, 2) [m]."""
+    return float(np.hypot(*(xy[:, None] - xy[None]).reshape(-1, 2).T).max())
 
 
 def _union(a: list[int], b: list[int]) -> list[int] | None:

@@ -60,6 +60,28 @@ def test_collinear_hanging_and_repeated_corners_are_no_faults():
     assert sorted(np.diff(blocks.start)) == [4] * 6
 
 
+@pytest.mark.parametrize("origin", [(0.0, 0.0), (412_345.67, 5_312_345.67)])
+def test_edges_miss_corners_by_more_where_coordinates_are_rounded(origin):
+    # A slope of 1 in 7 with corners of two narrower blocks on it, all to the centimetre.
+    whole = [(0, 0), (7, 1), (7, 3), (0, 3)]
+    halves = [[(0, 0), (0, -2), (3, -2), (3, 0.43)], [(3, 0.43), (3, -2), (7, -2), (7, 1)]]
+    found = check([whole, *halves], origin=origin)
+    assert found.faults == [] and found.corners == 1
+    assert found.largest_move == pytest.approx(abs(0.43 - 3 / 7) / np.hypot(1, 1 / 7), rel=1e-3)
+    halves = [[(0, 0), (0, -2), (3, -2), (3, 0.40)], [(3, 0.40), (3, -2), (7, -2), (7, 1)]]
+    assert "overlap" in check([whole, *halves], origin=origin).faults[0].found or "gap" in str(
+        check([whole, *halves])
+    )
+    # Round numbers are no reason to close what is as wide as their last decimal.
+    assert check([[(0, 0), (5, 0), (5, 8), (0, 8)], [(5.01, 0), (10, 0), (10, 8), (5.01, 8)]]).faults
+
+
+def test_an_edge_that_was_bent_to_a_corner_is_counted():
+    left, right = [(0, 0), (5, 0), (5, 8), (0, 8)], [(5, 0), (10, 0), (10, 8), (5, 8), (5.00301, 4)]
+    found = check([left, right])
+    assert found.faults == [] and found.corners == 1 and found.largest_move == pytest.approx(0.00301)
+
+
 @pytest.mark.parametrize("gap", [1e-4, 1e-3])
 def test_corners_that_just_miss_are_snapped_and_counted(gap):
     # Too narrow at one side: a gap to the right neighbour; and not quite closed.

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from graben.errors import Refused
 from graben.mechanics.blocks import polygons
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets, split
@@ -37,6 +38,20 @@ def test_a_line_parts_a_comb_in_all_its_teeth():
     assert len(pieces_of(COMB, [0.0, 0.0], [1.0, 0.0])) == 1
     assert area(pieces_of(COMB, [0.0, 1.0], [1.0, 0.0])) == pytest.approx(area([COMB]))
     assert area(pieces_of(COMB, [0.0, 0.0], [0.6, 0.8])) == pytest.approx(area([COMB]))
+
+
+def test_no_corner_crosses_a_line_that_cuts_nothing_and_thousands_of_joints_are_cut_soon():
+    sets = [JointSet(0.3, 0.02), JointSet(1.9, 0.5, 0.5, 0.2, 0.3)]
+    shapes, _ = cut(SLOPE, sets, seed=2)
+    assert len(shapes) > 1000 and area(shapes) == pytest.approx(polygons.signed_area(SLOPE))
+    across = np.array([-np.sin(0.3), np.cos(0.3)])
+    assert max(np.ptp(s @ across) for s in shapes) < 0.0201  # none was passed over
+
+
+def test_a_rock_of_which_mending_would_take_most_is_refused():
+    shapes, _ = cut(SLOPE, [JointSet(0.3, 0.05), JointSet(1.9, 0.05)], seed=1)
+    with pytest.raises(Refused, match="in blocks narrower than"):
+        mend(shapes, shortest=0.1, thinnest=0.1)
 
 
 def test_two_sets_across_each_other_give_bricks():
