@@ -21,6 +21,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 HOME = ROOT / ".matrix"
 RESULTS = ROOT / "results" / "matrix.jsonl"
+HUNG_S = 3600.0
 TWO = ("-n", "2", "--dist", "loadfile")
 
 
@@ -89,13 +90,26 @@ def _run(name: str, row: Row) -> dict[str, object]:
         os.environ | row.variables | {"XDG_CACHE_HOME": str(cache), "PATH": f"{python.parent}:{os.environ['PATH']}"}
     )
     environment = {k: v for k, v in environment.items() if v}
-    call = [python, "-m", "pytest", "-m", "not verify", f"--randomly-seed={row.seed}", *row.options]
+    call = [
+        python,
+        "-m",
+        "pytest",
+        "-vv",
+        "--tb=short",
+        "-m",
+        "not verify",
+        f"--randomly-seed={row.seed}",
+        *row.options,
+    ]
     log = HOME / f"{name}.log"
     busy = [subprocess.Popen([python, "-c", "while True: pass"]) for _ in range(row.load)]
     begun = time.monotonic()
     try:
         with log.open("w") as file:
-            code = subprocess.run(call, cwd=ROOT, env=environment, stdout=file, stderr=subprocess.STDOUT).returncode
+            code = subprocess.run(call, cwd=ROOT, env=environment, stdout=file, stderr=subprocess.STDOUT,
+                                  timeout=HUNG_S).returncode  # fmt: skip
+    except subprocess.TimeoutExpired:
+        code = -1
     finally:
         for process in busy:
             process.kill()
