@@ -1,6 +1,7 @@
 """Small real artifacts that several tests read; each is made once per session by the command that makes it."""
 
 import logging
+import signal
 from pathlib import Path
 
 import hypothesis
@@ -12,6 +13,11 @@ from graben.cli.main import main
 # The same examples on every machine, however slow it is; `make fuzz` is for new ones.
 hypothesis.settings.register_profile("same everywhere", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("same everywhere")
+
+# Under nohup and in background jobs of a shell signals are ignored, and so would they be by what the tests start.
+for _number, _usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+    if signal.getsignal(_number) is signal.SIG_IGN:
+        signal.signal(_number, _usual)
 
 ROOT = Path(__file__).parents[1]
 PIPELINES = ROOT / "pipelines"
