@@ -28,6 +28,19 @@ SMALL_BLOCKS = [
 SMALL_BED = ["fidelity=draft", 'box.width="0.6 mm"', 'box.depth="0.3 mm"']
 
 
+@pytest.fixture
+def laws_as_before():
+    """Laws from outside that a test makes known are forgotten after it."""
+    from graben.mechanics.materials.laws import LAWS
+    from graben.schemas.scenes.material import UNITS
+
+    former = [(known, dict(known)) for known in (LAWS, UNITS)]
+    yield
+    for known, before in former:
+        known.clear()
+        known.update(before)
+
+
 def command(*arguments):
     """Run `graben ARGUMENTS...` in this process; returns click's result."""
     return CliRunner().invoke(main, [str(a) for a in arguments])

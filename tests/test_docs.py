@@ -148,6 +148,7 @@ def test_scenes_in_the_text_are_taken_by_their_stages(page, tmp_path):
                 raise BadInput(faults)
 
 
+@pytest.mark.usefixtures("laws_as_before")
 @pages([p for p in DOCS if "```python" in read(p)])
 def test_python_in_the_text_runs(page, tmp_path, monkeypatch):
     """Beside wear.nc, a result that takes a moment."""

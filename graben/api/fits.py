@@ -111,9 +111,20 @@ def fit(
 def curve(
     axial_strain: ArrayLike, axial_stress: ArrayLike, lateral_strain: ArrayLike, lateral_stress: ArrayLike = 0.0
 ) -> tuple[Array, Array]:
-    """Stress and strain (steps, 4) for `fit` from the columns of a test, (steps,) each, tension positive, Pa.
+    """A curve for `fit` from the columns of a test, tension positive.
 
-    The lateral strain and stress are those of xx and zz; in plane strain zz has none. BadInput where they do not fit.
+    Parameters
+    ----------
+    axial_strain, axial_stress : (steps,), Pa
+    lateral_strain : (steps,); lateral_stress : (steps,) or one number, Pa
+
+    Returns
+    -------
+    stress and strain, (steps, 4) each, with nan in zz: `fit` takes what the kind of test says
+
+    Raises
+    ------
+    BadInput : columns of different lengths
     """
     columns = [np.asarray(c, dtype=np.float64) for c in (axial_strain, axial_stress, lateral_strain, lateral_stress)]
     steps = columns[0].shape

@@ -149,6 +149,7 @@ def follow(
 
     Parameters
     ----------
+    material : of `material`
     strain : (steps,) axial strain yy at each step, for "shear" the tensor shear xy. The first step is where the path
         starts
     stress : lateral stress in Pa, tension positive, a number or (steps,). It is that of xx ("plane-strain",
@@ -160,6 +161,10 @@ def follow(
     length : characteristic length in m, for laws with damage
     increments : between two steps
     tolerance : on prescribed stresses, relative to the largest stress
+
+    Returns
+    -------
+    the steps that were reached; ``complete`` says whether these are all
 
     Raises
     ------
@@ -246,6 +251,7 @@ def law(
     parameters : ``Parameter(name, unit, lower, upper, default)``, numbers with SI units that scenes know
     state : names, or initial values by name. ``equivalent_plastic_strain`` and ``damage`` are drawn by fem-run
     isotropic : whether the law knows no direction
+    title : one line that says what it is; the first line of the function's docstring unless given
 
     Raises
     ------

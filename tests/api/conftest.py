@@ -1,4 +1,4 @@
-"""Laws from outside are known in the tests of this room only."""
+"""A law from outside that is known in the tests of this room only."""
 
 import pytest
 
@@ -16,11 +16,6 @@ def voce_law():
 
 
 @pytest.fixture
-def foreign_laws(voce_law):
-    """ "voce test" is known, and what a test defines is forgotten after it."""
-    before, units = dict(LAWS), dict(UNITS)
+def foreign_laws(voce_law, laws_as_before):
+    """The law "voce test" is known, and what a test defines is forgotten after it."""
     LAWS["voce test"], UNITS["voce test"] = voce_law
-    yield
-    for known, former in ((LAWS, before), (UNITS, units)):
-        known.clear()
-        known.update(former)
