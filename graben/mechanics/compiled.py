@@ -16,6 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import sigutils
+from numba.core.ccallback import CFunc
 
 from graben.mechanics.kernel_cache import KernelCache
 
@@ -31,8 +33,21 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     if function is None:
         return lambda f: kernel(f, **options)
     dispatcher = numba.njit(**options)(function)
-    dispatcher._cache = KernelCache(function, f"{digest_of_sources(function.__module__)} {sorted(options.items())}")
+    dispatcher._cache = _cache_of(function, options)
     return dispatcher
+
+
+def c_kernel(signature: str, function: Callable[..., Any], **options: Any) -> Any:
+    """Compile `function` for that signature as one that can be called by its `address`, with the same disk cache."""
+    compiled: Any = CFunc(function, sigutils.normalize_signature(signature), locals={}, options=options)
+    compiled._cache = _cache_of(function, options, signature)
+    compiled.compile()
+    return compiled
+
+
+def _cache_of(function: Callable[..., Any], options: dict[str, Any], signature: str = "") -> KernelCache:
+    key = f"{digest_of_sources(function.__module__)} {sorted(options.items())} {signature}".rstrip()
+    return KernelCache(function, key)
 
 
 @cache

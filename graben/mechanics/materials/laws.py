@@ -81,7 +81,7 @@ def update(law_id, deps, sig, state, par, length, tangent):
     if law_id == 7:
         return update_energy_damage(deps, sig, state, par, length, tangent)
     if abs(law_id) >= FIRST:
-        return update_foreign(law_id, deps, sig, state, par, length, tangent)
+        return update_foreign(abs(law_id), deps, sig, state, par, length, tangent)
     return UNKNOWN_LAW
 
 
