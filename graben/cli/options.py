@@ -46,6 +46,7 @@ class Tool(Program, click.Command):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             with interrupts.at_work():
+                _refuse_small_address_space()
                 return super().invoke(ctx)
         except (Exception, KeyboardInterrupt) as error:
             interrupted = interrupts.came() or isinstance(error, KeyboardInterrupt)
@@ -67,6 +68,22 @@ class Tool(Program, click.Command):
             for line in lines:
                 _tell(f"{name}: {line}")
             ctx.exit(code)
+
+
+# Of address space that numpy, scipy, LLVM and VTK take when they are loaded [bytes].
+_LIBRARIES = 10**9
+
+
+def _refuse_small_address_space() -> None:
+    """MemoryError under a limit in which libraries fail to load, or in which OpenBLAS tries again for ever."""
+    with suppress(ImportError):
+        import resource
+
+        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+        if limit not in (resource.RLIM_INFINITY, -1) and limit < _LIBRARIES:
+            raise MemoryError(
+                f"libraries take {_LIBRARIES / 1e6:g} MB of address space (ulimit -v), not {limit / 1e6:g}"
+            )
 
 
 @dataclass(frozen=True)

@@ -75,6 +75,10 @@ class Outputs:
         """
         if self.main.name in ("", ".."):
             raise BadInput(Fault(str(self.main), "", "", "a file name for the output, not a folder"))
+        with machine(self.main):  # a working folder that is gone
+            self._claim(inputs, overwrite, restart)
+
+    def _claim(self, inputs: Iterable[Path | None], overwrite: bool, restart: bool) -> None:
         paths, kept = self.paths(), {beside(self.main, end) for end in self.kept}
         recover(paths[1:], self.main)
         faults = list(self._clashes([p for p in inputs if p is not None]))

@@ -12,8 +12,10 @@ DONE, BAD_INPUT, FAILED, INTERRUPTED = 0, 2, 3, 130
 # What the operating system says when the machine is at fault, not the program.
 _MACHINE = {
     errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM,
-    errno.ESTALE,
+    errno.ESTALE, errno.EAGAIN,
 }  # fmt: skip
+# What the loader of libraries and the interpreter say of the same.
+_NO_MEMORY = re.compile(r"failed to map segment|[Cc]annot allocate memory|can't start new thread")
 
 
 def as_options(fault: Fault) -> Fault:
@@ -37,7 +39,9 @@ def explain(error: BaseException) -> tuple[int, list[str]] | None:
         return FAILED, [f"the numerics failed: {error}", *getattr(error, "__notes__", [])]
     if isinstance(error, MachineFailed):
         return FAILED, [str(error)]
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or (
+        type(error) in (ImportError, RuntimeError) and _NO_MEMORY.search(str(error))
+    ):
         return FAILED, [f"not enough memory: {error}".rstrip(": ")]
     if isinstance(error, OSError) and error.errno in _MACHINE:
         return FAILED, [f"the machine failed: {error}"]

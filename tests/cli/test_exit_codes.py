@@ -2,6 +2,8 @@
 
 import errno
 import json
+import subprocess
+import sys
 
 import click
 import pytest
@@ -47,6 +49,9 @@ TWO_FAULTS = BadInput([Fault("a.toml", "seed", "-1", "0 or more"), Fault("a.toml
         (MachineFailed("out/a.nc", "No space left on device"), 3, ["out/a.nc", "No space left"]),
         (OSError(errno.ENOSPC, "No space left on device", "/tmp/x"), 3, ["/tmp/x", "No space left"]),
         (MemoryError("12 GB"), 3, ["not enough memory: 12 GB"]),
+        (ImportError("libx.so: failed to map segment from shared object"), 3, ["not enough memory", "libx.so"]),
+        (RuntimeError("can't start new thread"), 3, ["not enough memory"]),
+        (ImportError("no module x"), 1, ["a fault of the program"]),
         (KeyboardInterrupt(), 130, ["interrupted"]),
         (ZeroDivisionError("1/0"), 1, ["a fault of the program", "--debug"]),
     ],
@@ -103,3 +108,12 @@ def test_a_stage_needs_an_output():
     result = CliRunner().invoke(main, [])
     assert result.exit_code == 2
     assert "--output" in result.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems ignore the limit")
+def test_an_address_space_too_small_for_the_libraries_is_refused_before_they_hang(tmp_path):
+    script = "from graben.cli.start import graben; graben()"
+    command = ["bash", "-c", 'ulimit -v 500000; exec "$0" -c "$@"', sys.executable, script, "check", "x.toml"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, cwd=tmp_path)
+    assert done.returncode == 3, done.stderr
+    assert "not enough memory" in done.stderr and "ulimit -v" in done.stderr

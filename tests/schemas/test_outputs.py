@@ -206,6 +206,15 @@ def test_a_folder_that_cannot_be_written_is_the_machines_fault():
         Outputs(Path("/proc/none/a.nc")).claim([])
 
 
+@pytest.mark.skipif(os.name != "posix", reason="working folders cannot be removed there")
+def test_a_working_folder_that_is_gone_is_the_machines_fault(tmp_path, monkeypatch):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    with pytest.raises(MachineFailed, match=r"a\.nc"):
+        Outputs(Path("a.nc"), SERIES).claim([tmp_path / "scene.toml"])
+
+
 def test_what_a_stopped_run_kept_may_be_replaced_by_its_restart(tmp_path):
     outputs = Outputs(tmp_path / "a.nc", (), (CHECKPOINT,))
     np.savez(tmp_path / "a.checkpoint.npz", scene=np.array("digest"), x=np.arange(3))
