@@ -17,6 +17,9 @@ from graben.schemas.provenance import Record
 if TYPE_CHECKING:
     import xarray
 
+# In SI units no number of a rock or a grain comes near.
+_LARGEST = 1e60
+
 PARTIAL = "partial"
 """Global attribute of an artifact that a failed run kept: why it stopped."""
 
@@ -30,6 +33,7 @@ class Variable:
     dtype : numpy dtype; "S" or "U" for text
     optional : may be absent
     may_be_nan : nan marks "no value here" (padding, a measure that does not exist); elsewhere nan is a fault
+    may_be_all_nan : the same, and there may be no value at all
     index_of : the dim that its values are indices of; "dim or -1" where -1 marks none
     sum_of : the dim whose length its values add up to
     """
@@ -40,9 +44,13 @@ class Variable:
     dtype: str = "f8"
     optional: bool = False
     may_be_nan: bool = False
+    may_be_all_nan: bool = False
     index_of: str = ""
     sum_of: str = ""
     attributes: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "may_be_nan", self.may_be_nan or self.may_be_all_nan)
 
 
 @dataclass(frozen=True)
@@ -137,10 +145,15 @@ def write_artifact(
 def _refuse_non_finite(kind: str, name: str, declared: Variable, array: np.ndarray) -> None:
     if array.dtype.kind != "f":
         return
-    bad = np.isinf(array) if declared.may_be_nan else ~np.isfinite(array)
+    bad = _absurd(array) & ~(np.isnan(array) & declared.may_be_nan)
     if bad.any():
         first = tuple(int(i) for i in np.argwhere(bad)[0]) if array.ndim else ()
         raise NotFinite(f"{kind}: {name} holds {int(bad.sum())} values that are not finite, the first at {first}")
+
+
+def _absurd(values: np.ndarray) -> np.ndarray:
+    """Where numbers are nan, infinite, or so large that their cubes soon are."""
+    return ~(np.abs(values) < _LARGEST)
 
 
 def read_artifact(path: str | Path, kind: str | Iterable[str], *, partial: bool = False) -> xarray.Dataset:
@@ -269,9 +282,10 @@ def _value_faults(
         return [Fault(file, name, f"sum {values.sum()}", expected)]
     if values.dtype.kind != "f" or partial:
         return []
-    if not variable.may_be_nan and not np.isfinite(values).all():
-        bad = int((~np.isfinite(values)).sum())
-        return [Fault(file, name, f"{bad} of {values.size} values nan or infinite", "finite numbers")]
-    if variable.may_be_nan and np.isnan(values).all() and not variable.optional:
+    bad = _absurd(values) & ~(np.isnan(values) & variable.may_be_nan)
+    if bad.any():
+        found = f"{int(bad.sum())} of {values.size} values nan, infinite or absurdly large"
+        return [Fault(file, name, found, f"finite numbers below {_LARGEST:g}")]
+    if variable.may_be_nan and np.isnan(values).all() and not (variable.optional or variable.may_be_all_nan):
         return [Fault(file, name, "nan throughout", "at least one number")]
     return []

@@ -23,6 +23,7 @@ _SEAL = b"graben sha256 seal\n"
 _LENGTH = len(_SEAL) + hashlib.sha256().digest_size
 
 _TEXTS = ("title", "software", "software_version", "machine", "scene", "scene_sha256", "inputs", "cost")
+_TEXTS_IF_ANY = ("warnings", "partial")
 
 
 def seal(path: Path) -> None:
@@ -76,6 +77,7 @@ def attribute_faults(attributes: Mapping[str, Any], declared: Mapping[str, type]
     declared : those that only artifacts of this kind have, by type
     """
     wanted: dict[str, type] = {**dict.fromkeys(_TEXTS, str), "seed": int, **declared}
+    wanted |= {name: str for name in _TEXTS_IF_ANY if name in attributes}
     for name, kind in wanted.items():
         value = _plain(attributes[name]) if name in attributes else None
         if value is None:

@@ -137,7 +137,9 @@ class Outputs:
             if path.suffix == FOLDER and path.is_dir():
                 return all(_is_state(p) for p in path.iterdir())
             if path.is_file():
-                return path.stat().st_size == 0 or _MARKS.get(path.suffix, _artifact)(path, self.main)
+                main = path == self.main and self.kept  # an artifact, whatever its name ends in
+                mark = _artifact if main else _MARKS.get(path.suffix, _artifact)
+                return path.stat().st_size == 0 or mark(path, self.main)
         return False
 
     def _twin(self) -> Iterator[Fault]:
@@ -248,6 +250,11 @@ def owner_mark(output: Path) -> str:
     return f"<!-- graben: fields of {output.name.replace('--', '- -')} -->"
 
 
+def picture_mark(form: str) -> dict[str, str]:
+    """Metadata by which a picture of that form, such as ".png", shows that graben drew it."""
+    return {"Software" if form == ".png" else "Creator": _DRAWN}
+
+
 def _material(path: Path, main: Path) -> bool:
     text = path.read_text(encoding="utf-8")
     return text.startswith("#") and set(tomllib.loads(text)) == {"law", "parameters"} and "# fitted to" in text
@@ -262,7 +269,8 @@ def _npz(path: Path, main: Path) -> bool:
     return text.startswith(b"PK") and (b"scene.npy" in text or b"digest.npy" in text)
 
 
-_PICTURE = _text("[Mm]atplotlib")
+_DRAWN = "graben, drawn by Matplotlib"
+_PICTURE = _text(_DRAWN)
 # By the end of the name; anything else is an artifact.
 _MARKS: dict[str, Callable[[Path, Path], bool]] = {
     FOLDER: _text("UnstructuredGrid"),

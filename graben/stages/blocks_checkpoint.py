@@ -19,6 +19,7 @@ from graben.schemas.outputs import CHECKPOINT, beside
 from graben.schemas.saved import Arrays, read_saved, write_saved
 from graben.schemas.scene import Scene
 
+_LARGEST = 1e60  # of the finite numbers of a model, in SI units
 # Wall time between checkpoints on disk; a killed run loses no more than this and one saved state [s].
 EVERY_S = 60.0
 
@@ -88,6 +89,8 @@ def read(output: Path, scene: Scene) -> dict[str, Arrays]:
     parts: dict[str, Arrays] = {"model": {}, "test": {}, "history": {}}
     for name, values in read_saved(path, _marks(scene), "that of the same scene, settings and version").items():
         part, _, rest = name.partition(".")
+        if values.dtype.kind == "f" and (np.abs(values[np.isfinite(values)]) > _LARGEST).any():
+            raise BadInput(Fault(str(path), name, "", f"numbers below {_LARGEST:g}"))
         if part in parts:
             parts[part][rest] = values
     return parts

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+import io
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from graben.errors import BadInput, Fault
 from graben.schemas.artifact import PARTIAL, read_artifact
+from graben.schemas.artifact_marks import DIGEST
 from graben.schemas.files import whole_file
 from graben.schemas.kinds import LAYOUTS, layout
-from graben.schemas.outputs import Outputs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from graben.schemas.outputs import Outputs, picture_mark
 
 FORMATS = (".png", ".pdf", ".svg")
-DPI = 130
+_DPI = 130
 
 
 def run(artifact: Path, output: Path, *, overwrite: bool = False) -> None:
@@ -29,13 +27,18 @@ def run(artifact: Path, output: Path, *, overwrite: bool = False) -> None:
     if output.suffix not in FORMATS:
         raise BadInput(Fault(str(output), "", "", "a picture name ending in " + ", ".join(FORMATS)))
     Outputs(output, kept=()).claim([artifact], overwrite=overwrite)
-    figure = figure_of(artifact)
+    picture = drawn(artifact, output.suffix)
     with whole_file(output, ends_run=True) as temporary:
-        figure.savefig(temporary, dpi=DPI)
+        temporary.write_bytes(picture)
 
 
-def figure_of(artifact: Path) -> Figure:
-    """The picture of an artifact; BadInput where it has faults."""
+def drawn(artifact: Path, form: str) -> bytes:
+    """The picture of an artifact, as a file of one of FORMATS.
+
+    Raises
+    ------
+    BadInput : the artifact has faults, or another program wrote numbers into it that cannot be drawn
+    """
     dataset = read_artifact(artifact, LAYOUTS, partial=True)
     import matplotlib
 
@@ -51,5 +54,13 @@ def figure_of(artifact: Path) -> Figure:
         dataset = dataset.assign({name: dataset[name].fillna(0.0) for name in floats})
         words = f"kept by a run that failed; numbers that are not finite are drawn as 0: {stopped}"
         figure.text(0.01, 0.005, words[:160], fontsize=7, color="firebrick")
-    drawer.draw(dataset, figure)
-    return figure
+    picture = io.BytesIO()
+    try:
+        drawer.draw(dataset, figure)
+        figure.savefig(picture, format=form[1:], dpi=_DPI, metadata=picture_mark(form))
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        if DIGEST in dataset.attrs:
+            raise
+        expected = f"numbers that can be drawn ({error}); another program has written or edited this file"
+        raise BadInput(Fault(str(artifact), "", "", expected)) from error
+    return picture.getvalue()

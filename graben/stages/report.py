@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import html
-import io
 import json
 from pathlib import Path
 from typing import Any
@@ -41,9 +40,7 @@ def run(folder: Path, output: Path, *, overwrite: bool = False, progress: Progre
     sections = []
     for number, artifact in enumerate(artifacts):
         progress(number / len(artifacts), artifact.name)
-        drawn = io.BytesIO()
-        picture.figure_of(artifact).savefig(drawn, format="png", dpi=picture.DPI)
-        sections.append(_section(artifact, drawn.getvalue()))
+        sections.append(_section(artifact, picture.drawn(artifact, ".png")))
     title = f"graben: {folder.name}"
     body = "\n".join(sections)
     page = (

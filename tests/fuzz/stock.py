@@ -4,58 +4,70 @@ from __future__ import annotations
 
 import json
 import shutil
+from contextlib import chdir, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
-from tests.conftest import PIPELINES, ROOT, SMALL_BED, SMALL_BLOCKS, settings
+from graben.schemas.provenance import Record
+from tests.conftest import PIPELINES, ROOT, SMALL_BED, SMALL_BLOCKS
 from tests.fuzz.call import call
+
+QUICK = ["fidelity=draft", "swarm.starts=2", "swarm.particles=6", "swarm.generations=4", "refine.best=1",
+         "refine.iterations=3"]  # fmt: skip
 
 
 def make_stock(stock: Path) -> None:
-    """Scenes, artifacts, checkpoints, curves, a map and meshes, small enough that each try takes milliseconds."""
+    """Scenes, artifacts, checkpoints, curves, a map and meshes, small enough that each try takes milliseconds.
+
+    The same bytes each time: a try can be made again by its seed and number.
+    """
     from graben.schemas.kinds import SCENES
     from graben.schemas.template import template
 
-    (stock / "scenes").mkdir(parents=True)
-    (stock / "artifacts").mkdir()
+    for name in ("scenes", "artifacts", "restart", "straight", "map", "mesh", "meshes"):
+        (stock / name).mkdir(parents=True)
     for kind in SCENES:
         (stock / "scenes" / f"{kind}.template.toml").write_text(template(kind), encoding="utf-8")
+    udec = PIPELINES / "upscaling/reference/udec"
     small = {
         "blocks": small_text(PIPELINES / "upscaling/voronoi-granite.toml", SMALL_BLOCKS),
         "particles": small_text(PIPELINES / "wear/bed.toml", SMALL_BED),
         "fem": small_text(PIPELINES / "upscaling/slope.toml", ["fidelity=draft"]),
         "scratch": small_text(PIPELINES / "wear/scratch.toml", ["fidelity=draft"]),
         "wear": (PIPELINES / "wear/astm-g65-mixtures.toml").read_text(encoding="utf-8"),
-        "calibrate": small_text(PIPELINES / "upscaling/calibrate-udec.toml", ["fidelity=draft"]).replace(
-            "reference/udec", str(PIPELINES / "upscaling/reference/udec")
+        "calibrate": small_text(PIPELINES / "upscaling/calibrate-udec.toml", QUICK).replace(
+            "reference/udec", str(udec)
         ),
-    }
+        "rev-study": 'kind = "rev-study"\n[samples]\nradii = ["0.6 m", "0.9 m"]\ngrid = 2\n',
+    }  # fmt: skip
     for kind, text in small.items():
         (stock / "scenes" / f"{kind}.toml").write_text(text, encoding="utf-8")
-
-    make_artifacts(stock / "artifacts", stock / "scenes")
     shutil.copy(PIPELINES / "upscaling/reference/udec_voronoi_granite_fit.csv", stock / "curves.csv")
-    _make_restart(stock)
-    _make_map(stock)
+    _make_map(stock / "map")
     _make_meshes(stock)
+    # Clocks and folders would get into the artifacts.
+    with patch.object(Record, "closed_cost", lambda self: dict(self.cost)), chdir(stock):
+        make_artifacts(Path("artifacts"), Path("scenes"))
+        _make_restart(Path("restart"), Path("straight"), Path("scenes"))
 
 
 def make_artifacts(art: Path, scenes: Path) -> None:
     """A small artifact of each stage that is done in a second."""
-
-    def made(*arguments: Any) -> None:
-        answer = call(*arguments, seconds=600)
-        if answer.code:
-            raise RuntimeError(f"{arguments}: {answer.said}")
-
-    made("dem-run", scenes / "blocks.toml", "-o", art / "blocks.nc", "-q")
-    made("dem-run", scenes / "particles.toml", "-o", art / "bed.nc", "-q")
-    made("homogenize", art / "blocks.nc", "--radius", "1 m", "-o", art / "curves.nc", "-q")
-    made("wear-estimate", scenes / "wear.toml", "-o", art / "wear.nc", "-q")
-    quick = ["swarm.starts=1", "swarm.particles=6", "swarm.generations=4", "refine.best=1", "refine.iterations=3"]
-    made("calibrate", scenes / "calibrate.toml", *settings(quick), "-o", art / "calibration.nc", "-q")
+    _made("dem-run", scenes / "blocks.toml", "-o", art / "blocks.nc", "-q")
+    _made("dem-run", scenes / "particles.toml", "-o", art / "bed.nc", "-q")
+    _made("homogenize", art / "blocks.nc", "--radius", "1 m", "-o", art / "curves.nc", "-q")
+    _made("wear-estimate", scenes / "wear.toml", "-o", art / "wear.nc", "-q")
+    _made("calibrate", scenes / "calibrate.toml", "-o", art / "calibration.nc", "-q")
     for path in [p for p in art.iterdir() if p.suffix != ".nc"]:
         shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def _made(*arguments: Any) -> None:
+    answer = call(*arguments, seconds=600)
+    if answer.code:
+        raise RuntimeError(f"{arguments}: {answer.said}")
 
 
 def small_text(scene: Path, overrides: list[str]) -> str:
@@ -85,23 +97,47 @@ def small_text(scene: Path, overrides: list[str]) -> str:
     return text
 
 
-def _make_restart(stock: Path) -> None:
-    """What runs of blocks and of calibrate leave when they are interrupted."""
-    folder = stock / "restart"
-    folder.mkdir()
-    for kind, command in (("blocks", "dem-run"), ("calibrate", "calibrate")):
-        text = (stock / "scenes" / f"{kind}.toml").read_text(encoding="utf-8")
-        (folder / f"{kind}.toml").write_text(text.replace('"draft"', '"standard"'), encoding="utf-8")
-        for seconds in (1.0, 2.0, 3.0, 5.0, 8.0, 13.0):
-            call(command, folder / f"{kind}.toml", "-o", folder / f"{kind}.nc", "-q", seconds=seconds)
-            if any(p.suffix == ".npz" and p.name.startswith(kind) for p in folder.iterdir()):
-                break
-            for path in folder.glob(f"{kind}.*"):
-                if path.suffix not in (".toml", ".npz"):
-                    shutil.rmtree(path) if path.is_dir() else path.unlink()
+def _make_restart(folder: Path, straight: Path, scenes: Path) -> None:
+    """What runs of blocks and of calibrate leave when they are interrupted halfway, and straight runs of them."""
+    from graben.stages import calibrate, dem_run
+
+    for kind, stage, end in (("blocks", dem_run, "checkpoint"), ("calibrate", calibrate, "state")):
+        scene, kept = folder / f"{kind}.toml", folder / f"{kind}.{end}.npz"
+        shutil.copy(scenes / f"{kind}.toml", scene)
+        stage.run(scene, straight / f"{kind}.nc")
+        with suppress(KeyboardInterrupt):
+            stage.run(scene, folder / f"{kind}.nc", progress=_Until(0.5 if end == "checkpoint" else 0.0, kept))
+        if not kept.is_file():
+            raise RuntimeError(f"an interrupted run left no {kept}")
 
 
-def _make_map(stock: Path) -> None:
+@dataclass
+class _Until:
+    """Interrupts a run once it has come so far, and once there is a file where one is named."""
+
+    share: float
+    kept: Path | None = None
+
+    def __call__(self, fraction: float, message: str) -> None:
+        if fraction > self.share and (self.share or self.kept is None or self.kept.is_file()):
+            raise KeyboardInterrupt
+
+
+def warm(stock: Path, folder: Path) -> None:
+    """Compile, or load, every kernel: an interrupt within that leaves half a kernel for later tries."""
+    from graben.stages import scratch
+
+    (folder / "artifacts").mkdir()
+    make_artifacts(folder / "artifacts", stock / "scenes")
+    _made("fem-run", stock / "mesh/body.toml", "-o", folder / "body.nc", "-q")
+    _made("dem-run", stock / "map/map.toml", "-o", folder / "map.nc", "-q")
+    _made("show", stock / "artifacts/blocks.nc", "-o", folder / "blocks.png", "-q")
+    with suppress(KeyboardInterrupt):
+        scratch.run(stock / "scenes/scratch.toml", folder / "scratch.nc", progress=_Until(0.02))
+    shutil.rmtree(folder)
+
+
+def _make_map(folder: Path) -> None:
     """Three by three rectangles of 1 m, and a scene that loads them for a moment."""
     corners = [(float(i), float(j)) for i in range(3) for j in range(3)]
     squares = [[[x, y], [x + 1, y], [x + 1, y + 1], [x, y + 1], [x, y]] for x, y in corners]
@@ -109,14 +145,14 @@ def _make_map(stock: Path) -> None:
         {"type": "Feature", "properties": {"id": k}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
         for k, ring in enumerate(squares)
     ]
-    (stock / "map.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    (folder / "map.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     text = small_text(ROOT / "pipelines/upscaling/voronoi-granite.toml", [
         "fidelity=draft", 'domain.width="3 m"', 'domain.height="3 m"', 'loading.duration="1 s"', "loading.states=3",
     ])  # fmt: skip
     head, _, rest = text.partition("[tessellation]")
     rest = rest[rest.index("\n[") :]
     table = '[tessellation]\nmethod = "file"\nfile = "map.geojson"\nrounding = "0.05 m"\n'
-    (stock / "map.toml").write_text(head + table + rest, encoding="utf-8")
+    (folder / "map.toml").write_text(head + table + rest, encoding="utf-8")
 
 
 def _make_meshes(stock: Path) -> None:
@@ -124,7 +160,6 @@ def _make_meshes(stock: Path) -> None:
     import meshio
     import numpy as np
 
-    (stock / "meshes").mkdir()
     x, y = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 5))
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(25)])
     first = (np.arange(4)[:, None] * 5 + np.arange(4)).ravel()
@@ -134,8 +169,9 @@ def _make_meshes(stock: Path) -> None:
     mesh.write(stock / "meshes" / "m41.msh", file_format="gmsh", binary=False)
     mesh.write(stock / "meshes" / "m.vtu", binary=False)
     mesh.write(stock / "meshes" / "m.inp")
-    (stock / "mesh.toml").write_text(
-        'kind = "fem"\n[mesh]\nmethod = "file"\nfile = "MESH"\n'
+    shutil.copy(stock / "meshes/m.vtu", stock / "mesh/m.vtu")
+    (stock / "mesh/body.toml").write_text(
+        'kind = "fem"\n[mesh]\nmethod = "file"\nfile = "m.vtu"\n'
         '[material]\nlaw = "elastic"\n[material.parameters]\nyoung_modulus = "1 GPa"\npoisson_ratio = 0.2\n'
         '[[supports]]\nname = "base"\nstart = ["0 m", "0 m"]\nend = ["1 m", "0 m"]\nfix = "both"\n'
         '[[loads]]\nname = "top"\nstart = ["0 m", "1 m"]\nend = ["1 m", "1 m"]\nrate = "1 MPa/s"\n'

@@ -14,7 +14,7 @@ from typing import Any
 import graben
 from tests.conftest import ROOT
 from tests.fuzz.families import FAMILIES
-from tests.fuzz.stock import make_artifacts
+from tests.fuzz.stock import warm
 
 
 def one(family: str, seed: int, number: int, stock: Path, keep: bool = False) -> None:
@@ -37,7 +37,7 @@ def worker(pipe: Any, stock: Path) -> None:
     # An interrupt within an import leaves half a module, which later tries in this process would stumble over.
     for module in pkgutil.walk_packages(graben.__path__, "graben."):
         importlib.import_module(module.name)
-    make_artifacts(Path(tempfile.mkdtemp(dir=stock.parent)), stock / "scenes")
+    warm(stock, Path(tempfile.mkdtemp(dir=stock.parent)))
     while (task := pipe.recv()) is not None:
         try:
             one(*task, stock, keep=True)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from graben.errors import BadInput, NotFinite
-from graben.schemas import kinds
+from graben.schemas import artifact, kinds
 from graben.schemas.artifact import Layout, Variable, check_artifact, kind_of, read_artifact, write_artifact
 from graben.schemas.outputs import Outputs
 from graben.schemas.provenance import Record
@@ -62,6 +62,27 @@ def test_nan_is_never_written_where_it_means_nothing(tmp_path):
     with pytest.raises(NotFinite, match="force holds 1 values"):
         write(tmp_path / "a.nc", force=np.array([0.0, np.nan, 1.0]))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_numbers_whose_cubes_overflow_are_none(tmp_path, monkeypatch):
+    for gap in (-1e70, np.inf):
+        with pytest.raises(NotFinite, match="gap holds 1 values"):
+            write(tmp_path / "a.nc", gap=[np.nan, gap, 1.0])
+    monkeypatch.setattr(artifact, "_LARGEST", np.inf)
+    path = write(tmp_path / "a.nc", gap=[np.nan, -1e70, 1.0])
+    monkeypatch.undo()
+    monkeypatch.setitem(kinds.LAYOUTS, "sample", f"{__name__}:LAYOUT")
+    monkeypatch.setattr(kinds, "layout", lambda kind: LAYOUT)
+    assert [fault.key for fault in check_artifact(path)] == ["gap"]
+
+
+def test_a_variable_may_hold_no_number_at_all_where_its_layout_says_so(tmp_path, monkeypatch):
+    assert check_artifact(write(tmp_path / "a.nc", gap=[np.nan] * 3)) == []  # optional
+    gap = LAYOUT.variables["gap"]
+    for options, keys in (({}, ["gap"]), ({"may_be_all_nan": True}, [])):
+        layout = replace(LAYOUT, variables={**LAYOUT.variables, "gap": replace(gap, optional=False, **options)})
+        monkeypatch.setattr(kinds, "layout", lambda kind, layout=layout: layout)
+        assert [fault.key for fault in check_artifact(tmp_path / "a.nc")] == keys
 
 
 def test_an_interrupted_write_leaves_no_file(tmp_path, monkeypatch):
@@ -142,6 +163,7 @@ def test_layouts_of_all_kinds_declare_dims_units_and_names():
         ("inputs", '"text"', "inputs"),
         ("scene", "kind = 'other'", "scene_sha256"),
         ("seed", "one", "seed"),
+        ("warnings", 3.5, "warnings"),
         ("schema_version", "two", "schema_version"),
         ("schema_version", 1.5, "schema_version"),
         ("schema_kind", [1, 2], "schema_kind"),

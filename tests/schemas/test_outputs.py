@@ -9,7 +9,7 @@ import pytest
 
 from graben.errors import BadInput, MachineFailed
 from graben.schemas import files
-from graben.schemas.outputs import CHECKPOINT, LAST_GOOD, MATERIAL, PARTIAL, SERIES, Outputs, beside
+from graben.schemas.outputs import CHECKPOINT, LAST_GOOD, MATERIAL, PARTIAL, SERIES, Outputs, beside, picture_mark
 from graben.schemas.vtk import vtu_series
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
@@ -81,6 +81,24 @@ def test_a_folder_with_files_of_the_user_is_refused(content, tmp_path):
     path.parent.mkdir(exist_ok=True)
     path.write_text("precious")
     assert "k.vtu" in refused(Outputs(artifact, SERIES), overwrite=True)
+
+
+@pytest.mark.parametrize("end", ["png", "pdf", "svg"])
+def test_pictures_of_the_users_own_are_refused(end, tmp_path):
+    from matplotlib.figure import Figure
+
+    picture = tmp_path / f"k.{end}"
+    Figure().savefig(picture)
+    for outputs in (Outputs(picture, kept=()), Outputs(tmp_path / "a.nc", others=(picture,)), Outputs(picture)):
+        assert "graben wrote" in refused(outputs, overwrite=True)
+    Figure().savefig(picture, metadata=picture_mark(picture.suffix))
+    Outputs(picture, kept=()).claim([], overwrite=True)
+    refused(Outputs(picture), overwrite=True)  # as an artifact
+
+
+def test_a_mesh_of_the_users_is_no_artifact(tmp_path):
+    (tmp_path / "m.vtu").write_text('<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid">')
+    refused(Outputs(tmp_path / "m.vtu"), overwrite=True)
 
 
 def test_all_faults_are_named_at_once(tmp_path):

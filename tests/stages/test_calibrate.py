@@ -64,6 +64,21 @@ def test_picture_is_drawn(fitted, tmp_path):
     assert (tmp_path / "fit.png").stat().st_size > 20_000
 
 
+def test_parameters_that_are_all_held_by_a_bound_make_a_sound_artifact(tmp_path):
+    """Their standard errors are no numbers, and the stages that follow take them."""
+    scene = {
+        "kind": "calibrate", "curves": [str(REFERENCE)], "law": "mohr-coulomb", "length": "7.1 m",
+        "free": {"young_modulus": {"lower": "0.5 GPa", "upper": "0.6 GPa"}},
+        "fixed": {"poisson_ratio": 0.2, "friction_angle": "50 deg", "dilation_angle": "9 deg", "cohesion": "9 kPa"},
+    }  # fmt: skip
+    headline = calibrate.run(scene, tmp_path / "bound.nc", overrides=QUICK)
+    assert headline["at_bounds"] == ["young_modulus"]
+    assert check(tmp_path / "bound.nc") == []
+    assert (
+        pack_material(tmp_path / "bound.nc", "scene")[2]["young_modulus"] == headline["parameters"]["young_modulus"]
+    )
+
+
 def test_same_scene_and_seed_give_the_same_bits_whatever_the_workers(tmp_path):
     headlines = []
     for name, workers in (("a", 1), ("b", 2)):

@@ -38,3 +38,24 @@ def test_a_faulty_artifact_is_named_and_no_page_is_written(folder):
     with pytest.raises(BadInput, match=r"worse\.nc"):
         report.run(folder, folder / "page.html")
     assert not (folder / "page.html").exists()
+
+
+def test_numbers_that_another_program_wrote_and_that_cannot_be_drawn_are_bad_input(folder, monkeypatch):
+    import xarray
+
+    from graben.stages.show import curves
+
+    def fails(*arguments):
+        raise IndexError("index -1 is out of bounds")
+
+    with xarray.open_dataset(folder / "curves.nc", decode_times=False) as data:
+        data = data.load()
+    del data.attrs["content_sha256"]
+    data.to_netcdf(folder / "edited.nc")
+    picture.run(folder / "edited.nc", folder / "edited.png")
+    monkeypatch.setattr(curves, "draw", fails)
+    with pytest.raises(BadInput, match=r"edited\.nc: .*another program"):
+        picture.run(folder / "edited.nc", folder / "other.png")
+    with pytest.raises(IndexError):  # a fault of the program
+        picture.run(folder / "curves.nc", folder / "other.png")
+    assert not (folder / "other.png").exists()

@@ -41,10 +41,10 @@ LAYOUT = Layout(
             "1",
             "standard error with residuals correlated along each curve, in parameter_unit; nan where held by a bound "
             "or unknown",
-            may_be_nan=True,
+            may_be_all_nan=True,
         ),
         "standard_error_independent": Variable(
-            _P, "1", "standard error if all residuals were independent (too small)", may_be_nan=True
+            _P, "1", "standard error if all residuals were independent (too small)", may_be_all_nan=True
         ),
         "at_bound": Variable(_P, "1", "-1 at the lower bound, 1 at the upper, else 0", dtype="i1"),
         "identifiable": Variable(_P, "1", "1 where the curves narrow it down beyond its bounds", dtype="i1"),
@@ -55,15 +55,15 @@ LAYOUT = Layout(
             ("parameter", "other"),
             "1",
             "covariance, in fractions of each range (log where searched so)",
-            may_be_nan=True,
+            may_be_all_nan=True,
         ),
-        "correlation": Variable(("parameter", "other"), "1", "correlation", may_be_nan=True),
+        "correlation": Variable(("parameter", "other"), "1", "correlation", may_be_all_nan=True),
         "direction": Variable(("direction", "parameter"), "1", "unit vectors in fractions of each range"),
         "direction_error": Variable(
             ("direction",),
             "1",
             "standard deviation along a direction; nan where the curves do not see it",
-            may_be_nan=True,
+            may_be_all_nan=True,
         ),
         "direction_unseen": Variable(
             ("direction",), "1", "1 where it exceeds what the bounds alone give", dtype="i1"

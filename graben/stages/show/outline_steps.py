@@ -11,6 +11,7 @@ from graben.mechanics.averaging.history import History
 from graben.mechanics.averaging.outline import Outline
 from graben.mechanics.averaging.rev import Circle, Polygon, Rev
 from graben.schemas.files import whole_file
+from graben.schemas.outputs import picture_mark
 
 
 def save_steps(path: Path, history: History, outline: Outline, rev: Rev) -> None:
@@ -18,7 +19,7 @@ def save_steps(path: Path, history: History, outline: Outline, rev: Rev) -> None
     figure = Figure(figsize=(12, 12.5), layout="constrained")
     draw_steps(figure, history, outline, rev)
     with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=120)
+        figure.savefig(temporary, dpi=120, metadata=picture_mark(path.suffix))
 
 
 def draw_steps(figure: Figure, history: History, outline: Outline, rev: Rev) -> None:
