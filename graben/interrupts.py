@@ -28,7 +28,8 @@ class _State:
     mood = _IDLE
     process = 0  # whose signals these are: 0 for a program that only calls graben
     came_at = 0.0  # when the first signal came, 0 for none
-    raised = False
+    raised = False  # to be raised once, or once more where it was swallowed
+    interrupted = False
     held = 0
 
 
@@ -63,7 +64,7 @@ def _end(number: int, frame: FrameType | None) -> None:
 
 def _raise_once() -> None:
     if _State.came_at and _State.mood == _AT_WORK and not _State.held and not _State.raised:
-        _State.raised = True
+        _State.raised = _State.interrupted = True
         raise KeyboardInterrupt
 
 
@@ -85,7 +86,7 @@ def at_work() -> Iterator[None]:
     After it they are passed over where this process is graben's own, and are what they were before where it is not.
     """
     former, hook = _set(), sys.unraisablehook
-    _State.mood, _State.came_at, _State.raised, _State.held = _AT_WORK, 0.0, False, 0
+    _State.mood, _State.came_at, _State.raised, _State.interrupted, _State.held = _AT_WORK, 0.0, False, False, 0
     sys.unraisablehook = lambda unraisable: _again(unraisable.exc_value) or hook(unraisable)
     try:
         yield
@@ -105,8 +106,10 @@ def _again(error: BaseException | None) -> bool:
     import threading
 
     def send() -> None:
-        _State.came_at, _State.raised = 0.0, False
-        os.kill(os.getpid(), next(n for n in _SIGNALS if signal.getsignal(n) is _end))
+        number = next((n for n in _SIGNALS if signal.getsignal(n) is _end), None)
+        if _State.mood == _AT_WORK and number is not None:  # what was swallowed has not ended the command
+            _State.came_at, _State.raised = 0.0, False
+            os.kill(os.getpid(), number)
 
     threading.Timer(0.05, send).start()
     return True
@@ -114,7 +117,7 @@ def _again(error: BaseException | None) -> bool:
 
 def came() -> bool:
     """Whether the last command at work was interrupted, whatever exception that became on its way up."""
-    return _State.raised
+    return _State.interrupted
 
 
 def complete() -> None:

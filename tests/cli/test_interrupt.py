@@ -169,6 +169,25 @@ def test_an_interrupt_that_a_finalizer_swallows_comes_again():
     assert time.monotonic() - begun < 60
 
 
+def test_an_interrupt_that_a_callback_swallows_and_that_becomes_another_error(monkeypatch):
+    class Swallows:
+        def __del__(self):
+            kill_self()
+            time.sleep(60)
+
+    def body():
+        Swallows()
+        raise RuntimeError("no compiled object")
+
+    failed = []
+    monkeypatch.setattr(threading, "excepthook", failed.append)
+    assert CliRunner().invoke(tool(body), []).exit_code == 130
+    for thread in threading.enumerate():
+        if isinstance(thread, threading.Timer):
+            thread.join()
+    assert failed == []
+
+
 def test_a_second_signal_at_once_does_not_break_what_the_first_one_began():
     cleaned = []
 

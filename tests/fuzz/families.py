@@ -123,7 +123,7 @@ def outputs(rng: random.Random, stock: Path, folder: Path) -> None:
     shutil.copytree(stock / "mesh", folder, dirs_exist_ok=True)
     shutil.copy(stock / "artifacts/blocks.nc", folder / "in.nc")
     shutil.copy(stock / "scenes/wear.toml", folder / "wear.toml")
-    names = [name + end for name in ("a", "b", "a.b") for end in ENDS] + [*ODD, "in.nc", "wear.toml", "m.vtu"]
+    names = [name + end for name in ("a", "b", "a.b") for end in ENDS] + [*ODD, "wear.toml", "m.vtu"]
 
     def run(*options: str) -> Answer:
         command = rng.choice([

@@ -25,10 +25,14 @@ def one(family: str, seed: int, number: int, stock: Path, keep: bool = False) ->
         if keep:
             kept = ROOT / "results/fuzz" / f"{family}-{seed}-{number}"
             shutil.rmtree(kept, ignore_errors=True)
-            shutil.copytree(folder, kept)
+            shutil.copytree(folder, kept, symlinks=True, ignore=_pipes)
         raise
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _pipes(folder: str, names: list[str]) -> set[str]:
+    return {name for name in names if (Path(folder) / name).is_fifo()}
 
 
 def worker(pipe: Any, stock: Path) -> None:
