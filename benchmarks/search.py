@@ -28,9 +28,9 @@ import numpy as np
 from graben.mechanics.search.choices import METHODS, explore
 from graben.mechanics.search.multistart import search, sum_of_squares
 from graben.schemas.scene import load_scene
-from graben.stages.calibrate_problem import problem_of
-from graben.stages.calibrate_workers import Sent, workers_of
-from graben.stages.measured import Reading, read_measured
+from graben.stages.calibrate.measured import Reading, read_measured
+from graben.stages.calibrate.problem import problem_of
+from graben.stages.calibrate.workers import Sent, workers_of
 
 SCENE = Path(__file__).parents[1] / "pipelines/upscaling/calibrate-udec.toml"
 

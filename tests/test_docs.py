@@ -12,8 +12,8 @@ from graben.cli.main import TOOLS
 from graben.errors import BadInput
 from graben.schemas.kinds import SCENES
 from graben.schemas.scene import load_scene
-from graben.stages import wear_estimate
-from graben.stages.check import examine
+from graben.stages.tools.check import examine
+from graben.stages.wear_estimate import stage as wear_estimate
 
 ROOT = Path(__file__).parents[1]
 DOCS = sorted((ROOT / "docs").rglob("*.md"))

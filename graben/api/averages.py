@@ -59,7 +59,7 @@ def average(
     ------
     BadInput : faults of the run, or a region outside the model
     """
-    from graben.stages.homogenize import curves_of
+    from graben.stages.homogenize.stage import curves_of
 
     found = curves_of(
         [path_of(run)],

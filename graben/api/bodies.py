@@ -72,7 +72,7 @@ def block_model(scene: Given, set: Mapping[str, Any] | None = None, **keys: Any)
     ------
     BadInput : every fault of the scene
     """
-    from graben.stages.blocks import prepare
+    from graben.stages.blocks.stage import prepare
 
     prepared = prepare(_of_kind("blocks", scene, set, keys))
     return Blocks(prepared.ground.blocks, prepared.model, prepared.ground.origin)
@@ -100,8 +100,8 @@ def bed(
     NumericsFailed : the bed blew up or did not come to rest
     """
     from graben.mechanics.particles.bed import make_bed
-    from graben.stages.particles import prepare
-    from graben.stages.record import silent
+    from graben.stages.particles.stage import prepare
+    from graben.stages.shared.record import silent
 
     model = _of_kind("particles", scene, set, keys)
     law, recipe, _ = prepare(model)

@@ -77,11 +77,11 @@ def fit(
     ------
     BadInput : every fault of curves, bounds and parameters
     """
-    from graben.stages.calibrate import fit_curves, prepare_curves, reading_of
-    from graben.stages.calibrate_state import State
-    from graben.stages.calibrate_workers import workers_of
-    from graben.stages.measured import curve_of
-    from graben.stages.record import silent
+    from graben.stages.calibrate.measured import curve_of
+    from graben.stages.calibrate.stage import fit_curves, prepare_curves, reading_of
+    from graben.stages.calibrate.state import State
+    from graben.stages.calibrate.workers import workers_of
+    from graben.stages.shared.record import silent
 
     bounds = {name: _bounds(law, name, given) for name, given in free.items()}
     tables = {

@@ -23,7 +23,7 @@ from graben.schemas.scenes.material import (
     read_material,
     write_material,
 )
-from graben.stages.material import pack_values
+from graben.stages.shared.material import pack_values
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -84,7 +84,7 @@ def paved(outline: ArrayLike, size: float | str, refine: Refinements = ()) -> Qu
 
 def read(path: str | Path) -> QuadMesh:
     """The quads of a file that meshio reads, coordinates in m; BadInput where they are no body of plane quads."""
-    from graben.stages.fem_mesh import read_quads
+    from graben.stages.fem_run.mesh import read_quads
 
     return read_quads(Path(path))[0]
 

@@ -81,10 +81,10 @@ def plane_analysis(
     NumericsFailed : no equilibrium under gravity, or before the end where ``goal`` is "end"
     """
     from graben.mechanics.continuum.body import Material as Filling
-    from graben.stages.estimate import refuse_too_large
-    from graben.stages.fem_run import Analysis, problem_of
-    from graben.stages.fem_sizes import sizes_of
-    from graben.stages.record import silent
+    from graben.stages.fem_run.sizes import sizes_of
+    from graben.stages.fem_run.stage import Analysis, problem_of
+    from graben.stages.shared.estimate import refuse_too_large
+    from graben.stages.shared.record import silent
 
     tables = {
         "kind": "fem", "supports": list(supports), "loads": list(loads), "softening_width": softening_width,

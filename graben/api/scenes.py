@@ -45,7 +45,7 @@ def check(given: Given, set: Mapping[str, Any] | None = None, **keys: Any) -> li
     set, keys : as in `scene`; not for files of materials and artifacts
     """
     from graben.errors import BadInput
-    from graben.stages.check import check as check_file
+    from graben.stages.tools.check import check as check_file
 
     if isinstance(given, str | Path) and str(given).endswith((".material.toml", ".nc")):
         return check_file(given)

@@ -176,7 +176,7 @@ def homogenize(
     ------
     BadInput : faults of the inputs, or a region outside the model
     """
-    from graben.stages import homogenize as stage
+    from graben.stages.homogenize import stage
 
     several = inputs if isinstance(inputs, Sequence) and not isinstance(inputs, str) else [inputs]
     radii = radius if isinstance(radius, Sequence) and not isinstance(radius, str) else [radius]

@@ -46,7 +46,7 @@ def main(
     CURVES replace those of the scene. Writes one NetCDF artifact, and NAME.material.toml beside it, which
     fem-run and scratch take as it is.
     """
-    from graben.stages import calibrate
+    from graben.stages.calibrate import stage as calibrate
 
     with session.progress() as progress:
         headline = calibrate.run(

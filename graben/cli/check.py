@@ -22,7 +22,7 @@ def main(session: Session, files: tuple[Path, ...]) -> None:
     Reports every fault; exit code 2 if there is one.
     """
     from graben.errors import BadInput
-    from graben.stages.check import examine
+    from graben.stages.tools.check import examine
 
     found = {str(file): examine(file) for file in files}
     if any(faults for faults, _ in found.values()):
@@ -32,7 +32,7 @@ def main(session: Session, files: tuple[Path, ...]) -> None:
 
 def _words(absent: list[Fault]) -> str:
     """Needs of the command line do not make a scene faulty."""
-    from graben.stages.outcome import as_options
+    from graben.stages.shared.outcome import as_options
 
     needs = "; ".join(f"{fault.key}: {fault.expected}" for fault in map(as_options, absent))
     return f"no fault; to run it needs {needs}" if needs else "no fault"

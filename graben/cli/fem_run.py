@@ -31,7 +31,7 @@ def main(
     Writes one NetCDF artifact, and VTU files with a PVD beside it for ParaView. That no equilibrium is found
     beyond some load is the result (stepping.goal = "failure"), not an error.
     """
-    from graben.stages import fem_run
+    from graben.stages.fem_run import stage as fem_run
 
     with session.progress() as progress:
         headline = fem_run.run(

@@ -77,7 +77,7 @@ def main(
 
     Several inputs, or radii, become several paths of one artifact of curves, in the order given.
     """
-    from graben.stages import homogenize
+    from graben.stages.homogenize import stage as homogenize
 
     corners = _corners(polygon) if polygon is not None else []
     with session.progress() as progress:

@@ -56,7 +56,7 @@ class Tool(Program, click.Command):
                 if not interrupted:
                     raise
                 traceback.print_exc()
-            from graben.stages.outcome import explain
+            from graben.stages.shared.outcome import explain
 
             outcome = explain(KeyboardInterrupt() if interrupted else error)
             name = ctx.info_name or "graben"

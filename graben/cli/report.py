@@ -16,7 +16,7 @@ from graben.cli.options import FILE, Session, Tool, session_options
 @session_options
 def main(session: Session, folder: Path, output: Path, overwrite: bool) -> None:
     """Write one self-contained HTML page for a whole chain: numbers, costs, inputs and pictures."""
-    from graben.stages import report
+    from graben.stages.tools import report
 
     with session.progress() as progress:
         headline = report.run(folder, output, overwrite=overwrite, progress=progress)

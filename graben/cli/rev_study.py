@@ -48,8 +48,8 @@ def main(
     --calibrate each seed may come at several lateral stresses, which are fitted together.
     """
     from graben.schemas.scene import load_scene
-    from graben.stages import rev_study
-    from graben.stages.default_scene import default_scene
+    from graben.stages.rev_study import stage as rev_study
+    from graben.stages.shared.default_scene import default_scene
 
     short = list(overrides)
     if radii:

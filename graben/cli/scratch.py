@@ -32,7 +32,7 @@ def main(
     Without damage the degree of wear is a transient: it comes with the path over contact half-width (s_over_a) at
     which it was measured.
     """
-    from graben.stages import scratch
+    from graben.stages.scratch import stage as scratch
 
     with session.progress() as progress:
         headline = scratch.run(

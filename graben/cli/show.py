@@ -16,7 +16,7 @@ from graben.cli.options import FILE, Session, Tool, session_options
 @session_options
 def main(session: Session, artifact: Path, output: Path, overwrite: bool) -> None:
     """Draw what people want to see of an artifact of any kind."""
-    from graben.stages import picture
+    from graben.stages.tools import picture
 
     picture.run(artifact, output, overwrite=overwrite)
     session.report({"picture": str(output)})

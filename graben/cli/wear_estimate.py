@@ -45,7 +45,7 @@ def main(
     Counts come from a law or from a bed, grooves from the scene or from scratch artifacts, the force per contact from
     the grooves as given or from the machine's load.
     """
-    from graben.stages import wear_estimate
+    from graben.stages.wear_estimate import stage as wear_estimate
 
     with session.progress() as progress:
         headline = wear_estimate.run(

@@ -9,7 +9,7 @@ from typing import Any
 from graben.errors import BadInput, Fault
 from graben.schemas.outputs import files_of
 from graben.schemas.scene import Given, Overrides, load_scene
-from graben.stages.record import Progress, silent
+from graben.stages.shared.record import Progress, silent
 
 
 def run(
@@ -31,7 +31,7 @@ def run(
     NumericsFailed : the run had to stop; the last good state is kept beside the output
     """
     scene = load_scene(given, ("blocks", "particles"), overrides)
-    stage = import_module(f"graben.stages.{scene.kind}")
+    stage = import_module(f"graben.stages.{scene.kind}.stage")
     stage.outputs_of(scene, output).claim(files_of(scene), overwrite=overwrite, restart=restart)
     if not restart:
         return stage.run(scene, output, progress=progress)

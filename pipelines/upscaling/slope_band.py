@@ -23,7 +23,7 @@ from graben.mechanics.materials.laws import LAWS
 from graben.schemas.artifact import read_artifact
 from graben.schemas.plain import write_json
 from graben.schemas.scenes.material import read_material, write_material
-from graben.stages import fem_run
+from graben.stages.fem_run import stage as fem_run
 
 
 def drawn(

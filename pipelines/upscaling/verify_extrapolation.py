@@ -43,7 +43,7 @@ def rms(values: list[float]) -> float:
 
 def fit(variant: str, curves: list[Path], unseen: list[Path], output: Path) -> tuple[float, float]:
     """RMSE in Pa of a variant's fit to curves, and of its prediction of the curves of unseen."""
-    from graben.stages import calibrate
+    from graben.stages.calibrate import stage as calibrate
 
     scene, settings = VARIANTS[variant]
     found = calibrate.run(

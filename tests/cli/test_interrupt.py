@@ -17,7 +17,7 @@ from click.testing import CliRunner
 from graben import interrupts
 from graben.cli import start
 from graben.cli.options import Session, Tool, session_options
-from graben.stages.workers import compute
+from graben.stages.shared.workers import compute
 from tests.conftest import PIPELINES, ROOT, command
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
@@ -73,7 +73,7 @@ def test_a_signal_during_imports_ends_the_program(library, number, tmp_path):
 @pytest.mark.parametrize("number", SIGNALS)
 @pytest.mark.parametrize("place", ["load_scene", "_rate", "write_whole"])
 def test_a_signal_at_any_step_of_a_stage_leaves_nothing(place, number, tmp_path, monkeypatch):
-    stage = import_module("graben.stages.wear_estimate")
+    stage = import_module("graben.stages.wear_estimate.stage")
     real = getattr(stage, place)
 
     def signalled(*arguments, **named):
@@ -92,7 +92,7 @@ def test_a_signal_at_any_step_of_a_stage_leaves_nothing(place, number, tmp_path,
 def test_a_signal_between_the_pictures_of_a_report_ends_it(small_blocks, tmp_path, monkeypatch):
     for name in ("a.nc", "b.nc"):
         (tmp_path / name).write_bytes(small_blocks.read_bytes())
-    stage = import_module("graben.stages.report")
+    stage = import_module("graben.stages.tools.report")
     real = stage._section
 
     def signalled(artifact, png):
@@ -292,7 +292,7 @@ def test_a_signal_ends_the_wait_for_worker_processes_and_the_workers(tmp_path):
 def test_workers_end_when_the_process_that_began_them_is_killed(tmp_path):
     script = (
         "import sys; from tests.cli.test_interrupt import announce_and_sleep\n"
-        "from graben.stages.workers import compute\n"
+        "from graben.stages.shared.workers import compute\n"
         "compute(announce_and_sleep, [sys.argv[1]] * 2, processes=2)"
     )
     run = child(script, tmp_path, PYTHONPATH=str(ROOT))

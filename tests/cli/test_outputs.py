@@ -78,7 +78,7 @@ def test_inputs_outlive_the_run(name, scene, tmp_path):
 
 
 def test_nothing_of_the_users_is_replaced_and_no_work_begins(scene, tmp_path, monkeypatch):
-    monkeypatch.setattr("graben.stages.blocks.run", lambda *a, **k: pytest.fail("the run began"))
+    monkeypatch.setattr("graben.stages.blocks.stage.run", lambda *a, **k: pytest.fail("the run began"))
     (tmp_path / "k.vtu").mkdir()
     (tmp_path / "k.vtu/thesis.txt").write_text("precious")
     (tmp_path / "k-joints.pvd").write_text("precious")

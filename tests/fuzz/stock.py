@@ -99,7 +99,8 @@ def small_text(scene: Path, overrides: list[str]) -> str:
 
 def _make_restart(folder: Path, straight: Path, scenes: Path) -> None:
     """What runs of blocks and of calibrate leave when they are interrupted halfway, and straight runs of them."""
-    from graben.stages import calibrate, dem_run
+    from graben.stages import dem_run
+    from graben.stages.calibrate import stage as calibrate
 
     for kind, stage, end in (("blocks", dem_run, "checkpoint"), ("calibrate", calibrate, "state")):
         scene, kept = folder / f"{kind}.toml", folder / f"{kind}.{end}.npz"
@@ -125,7 +126,7 @@ class _Until:
 
 def warm(stock: Path, folder: Path) -> None:
     """Compile, or load, every kernel: an interrupt within that leaves half a kernel for later tries."""
-    from graben.stages import scratch
+    from graben.stages.scratch import stage as scratch
 
     (folder / "artifacts").mkdir()
     make_artifacts(folder / "artifacts", stock / "scenes")

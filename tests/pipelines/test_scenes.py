@@ -2,7 +2,7 @@
 
 import pytest
 
-from graben.stages.check import check
+from graben.stages.tools.check import check
 from tests.conftest import PIPELINES
 
 SCENES = sorted(PIPELINES.glob("*/*.toml"))

@@ -11,8 +11,8 @@ from graben.schemas.reading import MiB, read_bytes, read_json, read_text, read_t
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.material import read_material
 from graben.schemas.template import template
-from graben.stages.check import check
-from graben.stages.measured import Reading, read_measured
+from graben.stages.calibrate.measured import Reading, read_measured
+from graben.stages.tools.check import check
 
 READERS = {
     "scene": (".toml", lambda path: load_scene(path, "wear")),

@@ -1,0 +1,1 @@
+"""dem-run on blocks: `stage.py` is the way of its data, from scene to artifact."""

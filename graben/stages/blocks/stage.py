@@ -1,0 +1,239 @@
+"""dem-run for kind "blocks": tessellate, bring to rest, load, save."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from graben.errors import BadInput, Fault, MachineFailed, NumericsFailed, Refused
+from graben.mechanics.blocks import snapshot
+from graben.mechanics.blocks.bodies import build_bodies
+from graben.mechanics.blocks.history import History
+from graben.mechanics.blocks.in_situ import InSitu, put_in
+from graben.mechanics.blocks.model import BlockModel, Damping
+from graben.mechanics.blocks.plastic_zones import Strength
+from graben.mechanics.blocks.tessellation import Tessellation
+from graben.schemas.artifact import write_artifact
+from graben.schemas.files import together
+from graben.schemas.layouts.blocks import LAYOUT
+from graben.schemas.outputs import CHECKPOINT, PARTIAL, SERIES, Outputs, beside
+from graben.schemas.scenes.blocks import BlocksScene
+from graben.stages.blocks import checkpoint as blocks_checkpoint
+from graben.stages.blocks.biaxial import Biaxial
+from graben.stages.blocks.geometry import Ground, lay_out
+from graben.stages.blocks.joints import joints_of_sets
+from graben.stages.blocks.output import write_vtk
+from graben.stages.blocks.programme import Rising
+from graben.stages.blocks.sizes import sizes_of, steps_of
+from graben.stages.shared.estimate import Estimate, refuse_too_large
+from graben.stages.shared.last_good import keep_by, keeps_last_good, write_whole
+from graben.stages.shared.measures import warnings_of
+from graben.stages.shared.record import Progress, Record, silent
+
+# How a loading went that follows a force check.
+_PACED = ("loading_steps", "force_check_worst", "force_check_mean")
+
+
+def outputs_of(scene: BlocksScene, output: Path) -> Outputs:
+    """What a run writes, and what it leaves when it stops."""
+    series = (*SERIES, *("-joints" + end for end in SERIES)) if scene.output.vtk else ()
+    return Outputs(output, series, kept=(CHECKPOINT, PARTIAL))
+
+
+@keeps_last_good("no state had been saved yet; the first one is saved when the blocks have come to rest")
+def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Progress = silent) -> dict[str, Any]:
+    """Run a scene of blocks, write the artifact and its VTU files.
+
+    restart : go on from NAME.checkpoint.npz, which a run that was stopped left beside the output
+
+    Returns
+    -------
+    headline numbers of the test, see `Biaxial.headline` and `Rising.headline`
+
+    Raises
+    ------
+    BadInput : the mechanics refuse the scene; NumericsFailed : the run had to stop. What was saved until then is
+    written as NAME.partial.nc beside the output.
+    """
+    prepared = prepare(scene)
+    ground, model, test = prepared.ground, prepared.model, prepared.test
+    record = Record.begin(scene)
+    parts = blocks_checkpoint.read(output, scene) if restart else None
+    progress(0.0, f"{ground.blocks.size} blocks come to rest")
+    if parts is None:
+        test.begin(progress)
+    history = History(model, scene.output.balance)
+    if parts is not None:
+        _bring_back(blocks_checkpoint.path_for(output), model, test, history, parts)
+    keeper = blocks_checkpoint.Keeper(output, scene, len(history.time))
+
+    def keep(why: str) -> Path | None:
+        if not keeper.states:
+            return None
+        history.cut(keeper.states)
+        path = beside(output, PARTIAL)
+        write_artifact(path, LAYOUT, ground.placed(_arrays(model, history, test)), record, partial=why)
+        return path
+
+    keep_by(keep)
+
+    def save() -> None:
+        history.save()
+        _check_ledger(history, scene.numerics.energy_limit, model.steps_done)
+        keeper.keep(model, history, test.state())
+
+    try:
+        test.go_on(history, save, progress)
+    except (NumericsFailed, KeyboardInterrupt):
+        keeper.stopped()
+        raise
+    arrays = _arrays(model, history, test)
+    headline = test.headline(arrays) | ground.mended
+    headline["warnings"] = record.warnings = warnings_of(test.measures(headline))
+    arrays = ground.placed(arrays)
+    record.cost |= {
+        "steps": model.steps_done,
+        "consolidation_steps": int(test.rest[1]),
+        "zones": len(arrays["zone_block"]),
+        "zone_steps": model.steps_done * len(arrays["zone_block"]),
+        "contact_searches": model.rebuilds,
+        "time_step_s": model.dt,
+        "mass_ratio_median": float(np.median(model.mass_ratio)),
+        "mass_ratio_max": float(model.mass_ratio.max()),
+        "consolidation_unbalanced_force_ratio": float(test.rest[0]),
+        "largest_overlap_m": max(history.overlap),
+        **{name: headline[name] for name in (*test.ERRORS, *_PACED) if name in headline},
+        **{f"block_{name}": value for name, value in ground.blocks.statistics().items()},
+        **ground.mended,
+        **({"local_origin_m": ground.origin.tolist()} if ground.origin.any() else {}),
+    }
+    try:
+        with together():
+            if scene.output.vtk:
+                write_vtk(output, arrays)
+            write_whole(output, LAYOUT, arrays, record)
+    except (MachineFailed, KeyboardInterrupt):
+        keeper.stopped()
+        raise
+    keeper.remove()
+    return headline
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A checked scene whose work has not begun."""
+
+    ground: Ground
+    model: BlockModel
+    test: Biaxial | Rising
+    sizes: list[Estimate]
+
+
+def prepare(scene: BlocksScene) -> Prepared:
+    """Blocks, joints and loading of a scene, after every check that the run makes; nothing has moved.
+
+    Raises
+    ------
+    BadInput : the scene is too large, or the mechanics refuse it
+    """
+    file, programme = scene.source.path, scene.programme
+    sizes = sizes_of(scene)
+    refuse_too_large(file, sizes)
+    duration = scene.loading.duration if programme is None else programme.end
+    gravity = (0.0, 0.0) if programme is None else (programme.horizontal, programme.vertical)
+    ground = lay_out(scene)
+    scene = ground.scene
+    steps = steps_of(scene, ground.blocks.size)
+    if programme is None and scene.loading.states > steps + 1:
+        expected = f"at most {steps + 1}: one state a step"
+        raise BadInput(Fault(str(file), "loading.states", str(scene.loading.states), expected))
+    try:
+        model = _model(scene, ground.blocks, duration / steps, gravity)
+        _put_stress_in(scene, model)
+        test = Biaxial(scene, model, steps) if programme is None else Rising(scene, model, steps)
+    except Refused as error:
+        key = "loading" if programme is None else "programme"
+        raise BadInput(Fault(str(file), key, "", str(error))) from error
+    return Prepared(ground, model, test, sizes)
+
+
+def _bring_back(
+    path: Path, model: BlockModel, test: Biaxial | Rising, history: History, parts: dict[str, Any]
+) -> None:
+    try:
+        snapshot.bring_back(model, parts["model"])
+        test.bring_back(parts["test"])
+        history.bring_back(parts["history"])
+    except Refused as error:
+        raise BadInput(Fault(str(path), "restart", "", f"a checkpoint of this model ({error})", True)) from error
+
+
+def _model(scene: BlocksScene, tessellation: Tessellation, dt: float, gravity: tuple[float, float]) -> BlockModel:
+    bodies = build_bodies(tessellation, scene.tessellation.zone_edge)
+    joints, between = joints_of_sets(scene.joints, bodies.edge_set)
+    return BlockModel(
+        bodies,
+        young=scene.rock.young,
+        poisson=scene.rock.poisson,
+        density=scene.rock.density,
+        joint=joints[0],
+        more_joints=joints[1:],
+        edge_set=bodies.edge_set,
+        set_between=between,
+        rounding=scene.tessellation.rounding,
+        dt=dt,
+        gravity=gravity,
+        damping=_damping(scene, dt),
+        threads=scene.numerics.threads,
+        strength=Strength(*scene.rock.strength) if scene.rock.zones == "mohr-coulomb" else None,
+        rigid=scene.rock.zones == "rigid",
+    )
+
+
+def _put_stress_in(scene: BlocksScene, model: BlockModel) -> None:
+    s = scene.in_situ
+    if s is None:
+        return
+    level = float(model.bodies.outline[:, 1].max()) if s.level is None else s.level
+    stress, rise = (s.sxx, s.syy, s.sxy), (s.sxx_rise, s.syy_rise, s.sxy_rise)
+    if s.k0 is not None and scene.programme is not None:
+        weight = -scene.rock.density * scene.programme.vertical
+        stress, rise = (s.k0 * s.syy, s.syy, 0.0), (s.k0 * weight, weight, 0.0)
+    put_in(model, InSitu(stress, rise, level))
+
+
+def _damping(scene: BlocksScene, dt: float) -> Damping:
+    n = scene.numerics
+    if n.damping == "local":
+        return Damping(ratio=-1.0, local=n.damping_share or 0.0)
+    if n.damping == "viscous":
+        coefficient = n.damping_coefficient or 0.0
+        if coefficient * dt > 1.0:
+            key, value = "numerics.damping_coefficient", f"{coefficient:.4g} 1/s"
+            raise BadInput(Fault(str(scene.source.path), key, value, f"at most 1 / time step = {1.0 / dt:.4g} 1/s"))
+        return Damping(ratio=-1.0, coefficient=coefficient)
+    return Damping(ratio=n.damping_ratio)
+
+
+def _check_ledger(history: History, limit: float, step: int) -> None:
+    e = history.model.energies()
+    turnover = abs(e["boundary"]) + abs(e["external"]) + e["strain"] + e["joint"]
+    first = history.rows["energy"][0][-1]
+    error = abs(e["error"] - first) / turnover
+    if not error < limit:
+        raise NumericsFailed(
+            f"energy error {100 * error:.2g} % (limit {100 * limit:.2g} %)",
+            step=step,
+            advice="take more steps (numerics.steps) or a finer fidelity",
+        )
+
+
+def _arrays(model: BlockModel, history: History, test: Biaxial | Rising) -> dict[str, np.ndarray]:
+    arrays = history.arrays()
+    # The ledger starts at the first state: what is stored then counts as given.
+    arrays["energy_error"] = arrays["energy_error"] - arrays["energy_error"][0]
+    arrays["outline"] = model.bodies.outline
+    return arrays | test.arrays(history)

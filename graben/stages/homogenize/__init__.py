@@ -1,0 +1,1 @@
+"""homogenize: `stage.py` averages runs of blocks, `spheres.py` beds of grains."""

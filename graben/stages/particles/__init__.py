@@ -1,0 +1,1 @@
+"""dem-run on grains: `stage.py` is the way of its data, from scene to artifact."""

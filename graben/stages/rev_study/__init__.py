@@ -1,0 +1,1 @@
+"""rev-study: `stage.py` is the way of its data, from runs to a representative size."""

@@ -1,0 +1,212 @@
+"""Calibrated parameters of every sample of a REV study, as if each place and radius were all that is known.
+
+Y 4.4: a parameter is representative from the radius on at which its fits stay the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from graben.errors import BadInput, Fault, Refused
+from graben.mechanics.materials.laws import LAWS
+from graben.mechanics.search.curves import Curve, CurveFit, Weights
+from graben.mechanics.search.identifiability import identify
+from graben.mechanics.search.levenberg_marquardt import jacobian
+from graben.mechanics.search.multistart import Found, Plan, search
+from graben.mechanics.search.space import Box
+from graben.schemas.scenes.calibrate import CalibrateScene
+from graben.schemas.scenes.rev_study import RevStudyScene
+from graben.stages.shared.record import Progress
+from graben.stages.shared.workers import compute
+
+# The one fit that all samples begin with.
+_FIRST = {
+    "draft": Plan(starts=1, particles=24, generations=60),
+    "standard": Plan(starts=2, particles=24, generations=100),
+    "reference": Plan(starts=4, particles=48, generations=200, refine_best=4),
+}
+# Then each sample refines the best sets of that one (how many, iterations). Nothing random takes part: a swarm of its
+# own for each sample ends in other basins that fit as well, and that would pass for scatter of the rock.
+_EACH = {"draft": (1, 20), "standard": (3, 40), "reference": (6, 80)}
+
+
+@dataclass(frozen=True)
+class FitTask:
+    """One fit, as a worker needs it: the law, what is fixed, the box, the curves, and where to begin."""
+
+    law: str
+    fixed: dict[str, Any]
+    box: Box
+    weights: Weights
+    length: float
+    increments: int
+    lag: int
+    seed: int
+    plan: Plan
+    guesses: np.ndarray | None
+    curves: tuple[Curve, ...]
+
+    def solve(self) -> tuple[CurveFit, Found]:
+        """The best parameters in the unit box."""
+        fit = CurveFit(
+            self.law, self.fixed, self.box.names, self.curves, self.weights, length=self.length, parts=self.increments
+        )
+        found = search(
+            lambda unit: fit.residuals(self.box.to_values(unit)),
+            self.box.size,
+            self.plan,
+            seed=self.seed,
+            guesses=self.guesses,
+        )
+        return fit, found
+
+
+@dataclass(frozen=True)
+class Fits:
+    """names, units (parameter,); value (parameter, radius, centre, realization) SI; stress_rmse
+    (radius, centre, realization) Pa; identifiable (parameter,) by the first fit; box: bounds."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    value: np.ndarray
+    stress_rmse: np.ndarray
+    identifiable: np.ndarray
+    box: Box
+
+    def at_bound(self) -> np.ndarray:
+        """(parameter, radius) samples whose parameter lies on a bound: there the bound chose it."""
+        unit = self.box.to_unit(np.moveaxis(self.value, 0, -1))
+        return np.moveaxis(((unit <= 1e-6) | (unit >= 1.0 - 1e-6)).sum(axis=(1, 2)), -1, 0)
+
+
+def fit_sample(task: FitTask) -> tuple[np.ndarray, float]:
+    """Parameters (k,) in SI and RMSE of the axial stress in Pa; runs in a worker process."""
+    fit, found = task.solve()
+    values = task.box.to_values(found.best.x)
+    return values, float(fit.errors(values)["stress"])
+
+
+def fit_samples(
+    scene: RevStudyScene,
+    law: CalibrateScene,
+    stress: np.ndarray,
+    strain: np.ndarray,
+    groups: np.ndarray,
+    middle: int,
+    processes: int,
+    cluster: str | None,
+    progress: Progress,
+) -> Fits:
+    """Fit the law to the curves of every (radius, centre, realization).
+
+    Parameters
+    ----------
+    scene, law : the study, and the scene of kind "calibrate" with its law, bounds and weights
+    stress, strain : (radius, centre, run, step, 4) Pa and 1, shorter runs end in nan
+    groups : (realization, confinement) runs of each realization
+    middle : the centre whose largest radius gives the first fit
+    processes, cluster, progress : see `compute`
+
+    Raises
+    ------
+    BadInput : the law refuses the scene's parameters, or a bound is out of its range
+    """
+    box = _box(law)
+    radii, centres = stress.shape[:2]
+    increments = law.increments or {"draft": 1, "standard": 2, "reference": 4}[scene.fidelity]
+    w = law.weights
+
+    def task(r: int, c: int, runs: np.ndarray, plan: Plan, guesses: np.ndarray | None) -> FitTask:
+        curves = tuple(_curve(stress[r, c, run], strain[r, c, run], f"run {run}") for run in runs)
+        return FitTask(
+            law.law, law.fixed_si(), box, Weights(w.normalise, w.last, w.strain, w.penalty), law.length, increments,
+            law.correlation_length, scene.seed, plan, guesses, curves,
+        )  # fmt: skip
+
+    progress(0.0, "the first fit, at the largest radius")
+    first = task(radii - 1, middle, groups[0], _FIRST[scene.fidelity], None)
+    fit, found = first.solve()
+    best = found.best
+    slopes, coarse = (jacobian(lambda u: fit.residuals(box.to_values(u)), best.x, step) for step in (1e-4, 2e-4))
+    known = identify(
+        best.x, best.residuals, slopes, groups=fit.groups, lag=first.lag, noise=coarse - slopes, floor=fit.floor
+    )
+    sets, iterations = _EACH[scene.fidelity]
+    guesses = found.members[:sets]
+    each = Plan(starts=1, particles=len(guesses), generations=0, refine_best=len(guesses), iterations=iterations)
+    tasks = [task(r, c, runs, each, guesses) for r in range(radii) for c in range(centres) for runs in groups]
+    results = compute(fit_sample, tasks, processes, lambda f: progress(0.1 + 0.9 * f, "calibrating"), cluster=cluster)
+    shape = (radii, centres, len(groups))
+    return Fits(
+        names=box.names,
+        units=tuple(LAWS[law.law].parameter(n).unit for n in box.names),
+        value=np.moveaxis(np.array([v for v, _ in results]).reshape(*shape, box.size), -1, 0),
+        stress_rmse=np.array([e for _, e in results]).reshape(shape),
+        identifiable=np.asarray(known.identifiable, dtype=bool),
+        box=box,
+    )
+
+
+def _curve(stress: np.ndarray, strain: np.ndarray, name: str) -> Curve:
+    """Plane strain: no strain out of the plane, and shear is not prescribed (as calibrate reads curves)."""
+    valid = np.isfinite(stress[:, 1])
+    strain = strain[valid].copy()
+    strain[:, 2:] = 0.0
+    return Curve(name, stress[valid].copy(), strain)
+
+
+def check_law(scene: RevStudyScene, law: CalibrateScene) -> None:
+    """Raise BadInput where the law cannot be fitted, or a name that must settle is not free."""
+    free = _box(law).names
+    assert scene.calibration is not None
+    faults = [
+        Fault(str(scene.source.path), "calibration.properties", n, f"a free parameter: {', '.join(free)}")
+        for n in scene.calibration.properties
+        if n not in free
+    ]
+    if faults:
+        raise BadInput(faults)
+
+
+def _box(scene: CalibrateScene) -> Box:
+    """Bounds of the free parameters, held against the ranges of the law."""
+    names, lower, upper, log, _ = scene.bounds_si()
+    law = LAWS[scene.law]
+    path = str(scene.source.path)
+    faults = []
+    if scene.test != "plane-strain":
+        faults.append(Fault(path, "test", scene.test, '"plane-strain": averages of blocks'))
+    for name, low, high in zip(names, lower, upper):
+        p = law.parameter(name)
+        if not (p.lower <= low and high <= p.upper):
+            faults.append(Fault(path, f"free.{name}", f"{low:g} to {high:g}", f"{p.lower:g} to {p.upper:g} {p.unit}"))
+    if faults:
+        raise BadInput(faults)
+    try:
+        CurveFit.stand_in(scene.law, scene.fixed_si(), names)
+    except Refused as error:
+        raise BadInput(Fault(path, "", "", f"a law that can be fitted ({error})")) from error
+    return Box.of(names, lower, upper, log)
+
+
+def chosen_parameters(scene: RevStudyScene, fits: Fits) -> Sequence[str]:
+    """Names that must settle: those asked for, or those that the first fit's curves can tell.
+
+    Raises
+    ------
+    BadInput : none asked for and none identifiable
+    """
+    assert scene.calibration is not None
+    file, free = str(scene.source.path), ", ".join(fits.names)
+    names = scene.calibration.properties or [n for n, told in zip(fits.names, fits.identifiable) if told]
+    if not names:
+        raise BadInput(
+            Fault(
+                file, "calibration.properties", "[]", f"names; the curves tell none of {free} apart from the others"
+            )
+        )
+    return names

@@ -1,0 +1,1 @@
+"""What all stages use: records, estimates of size, error measures, workers, the last good state."""

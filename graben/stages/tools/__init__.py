@@ -1,0 +1,1 @@
+"""The small tools: check, show (pictures) and report."""

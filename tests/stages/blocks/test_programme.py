@@ -1,0 +1,176 @@
+"""dem-run on blocks of any outline: weight, rising pressure, failure; stopped runs go on bitwise."""
+
+import numpy as np
+import pytest
+import xarray
+
+from graben.errors import BadInput, NumericsFailed
+from graben.schemas.artifact import check_artifact, read_artifact
+from graben.stages import dem_run
+from graben.stages.tools import picture
+
+SLOPE = """
+kind = "blocks"
+seed = 2
+[domain]
+outline = [["0 m","0 m"],["8 m","0 m"],["8 m","5 m"],["4 m","5 m"],["3 m","2 m"],["0 m","2 m"]]
+[tessellation]
+edge = "0.5 m"
+[numerics]
+steps = 10000
+[output]
+vtk = false
+[programme]
+save_every = "8 s"
+patience = 4000
+[[programme.supports]]
+start = ["0 m","0 m"]
+end = ["0 m","2 m"]
+fix = "x"
+[[programme.supports]]
+start = ["8 m","0 m"]
+end = ["8 m","5 m"]
+fix = "x"
+[[programme.supports]]
+start = ["0 m","0 m"]
+end = ["8 m","0 m"]
+fix = "y"
+[[programme.loads]]
+start = ["5.1 m","5 m"]
+end = ["6.1 m","5 m"]
+rate = "0.25 MPa/s"
+"""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    path = tmp_path_factory.mktemp("slope") / "slope.toml"
+    path.write_text(SLOPE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def finished(scene):
+    output = scene.with_name("straight.nc")
+    return output, dem_run.run(scene, output)
+
+
+def same(a, b):
+    with xarray.open_dataset(a) as left, xarray.open_dataset(b) as right:
+        assert set(left.variables) == set(right.variables)
+        for name in left.variables:
+            assert np.array_equal(left[name].values, right[name].values), name
+
+
+def test_a_loaded_slope_fails_after_it_stood(finished):
+    output, headline = finished
+    assert check_artifact(output) == []
+    assert headline["failed"]
+    assert headline["failure_load_pa"] == headline["largest_load_pa"]
+    assert 1e6 < headline["failure_load_pa"] < 25e6
+    assert headline["settlement_rate_over_first"] > 1.0
+    assert headline["energy_error"] < 0.05
+    d = read_artifact(output, "blocks")
+    # The base and the weight at the first state, then the load as well.
+    weight = 9.81 * 2700.0 * float(d.block_area.sum())
+    vertical = d.boundary_force.values[..., 1].sum(axis=1)
+    assert vertical[0] == pytest.approx(weight, rel=0.01)
+    load = 0.25e6 * d.load_time.values[1]
+    assert abs(vertical[1] - weight) < 0.2 * load
+    assert 0.0 < headline["inertia_over_load"] < 0.2
+    assert d.load_time.values[0] == 0.0
+    assert (np.diff(d.look_load_time) >= 0.0).all()
+    surface = d.vertex_position.values[d.surface_vertex.values]
+    assert surface[:, 1].max() == pytest.approx(5.0, abs=0.02)
+    assert not np.any((surface[:, 1] < 1.9) & (surface[:, 0] > 0.1))
+    assert headline["settlement_max_m"] == pytest.approx(-d.surface_carried_displacement.values[:, 1].min(), rel=0.5)
+
+
+def test_picture_of_a_slope(finished):
+    output = finished[0].with_name("slope.png")
+    picture.run(finished[0], output)
+    assert output.stat().st_size > 10_000
+
+
+def test_interrupted_and_restarted_is_bitwise_the_straight_run(scene, finished):
+    output = scene.with_name("stopped.nc")
+
+    def stop(fraction, message):
+        if fraction > 0.1:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        dem_run.run(scene, output, progress=stop)
+    kept = output.with_name("stopped.checkpoint.npz")
+    assert kept.is_file()
+    assert not output.exists()
+    dem_run.run(scene, output, restart=True)
+    same(finished[0], output)
+    assert not kept.exists()
+
+
+def test_compression_restarts_bitwise(scene):
+    text = 'kind = "blocks"\n[domain]\nwidth = "2 m"\nheight = "2 m"\n[numerics]\nsteps = 1500\n'
+    text += '[loading]\nstates = 6\nspeed = "0.1 mm/s"\n[output]\nvtk = false\n'
+    path = scene.with_name("square.toml")
+    path.write_text(text)
+    straight, stopped = path.with_name("a.nc"), path.with_name("b.nc")
+    dem_run.run(path, straight)
+    for stop_at in (0.0, 0.6):
+
+        def stop(fraction, message, stop_at=stop_at):
+            if message.startswith("state") and fraction >= stop_at:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            dem_run.run(path, stopped, progress=stop, overwrite=True)
+        dem_run.run(path, stopped, restart=True, overwrite=True)
+        same(straight, stopped)
+
+
+def test_restart_wants_a_checkpoint_of_this_scene(scene):
+    output = scene.with_name("none.nc")
+    with pytest.raises(BadInput, match="a checkpoint"):
+        dem_run.run(scene, output, restart=True)
+
+    def stop(fraction, message):
+        if fraction > 0.01:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        dem_run.run(scene, output, progress=stop)
+    with pytest.raises(BadInput, match="another scene"):
+        dem_run.run(scene, output, restart=True, overrides=["seed=3"])
+    kept = scene.with_name("none.checkpoint.npz")
+    whole = kept.read_bytes()
+    for data in (whole[: len(whole) // 2], b""):
+        kept.write_bytes(data)
+        with pytest.raises(BadInput, match="saved states") as error:
+            dem_run.run(scene, output, restart=True)
+        assert error.value.faults[0].file == str(kept)
+
+
+def test_a_body_that_does_not_stand_is_a_failure_of_the_run(scene):
+    with pytest.raises(NumericsFailed):
+        dem_run.run(
+            scene,
+            scene.with_name("falls.nc"),
+            overrides=['joints.friction="0 deg"', 'joints.cohesion="0 Pa"', 'joints.dilation="0 deg"'],
+        )
+
+
+@pytest.mark.parametrize(
+    ("setting", "word"),
+    [
+        ('programme.loads=[{start=["5 m","4 m"],end=["6 m","4 m"]}]', "outline"),
+        ('programme.supports=[{start=["5 m","4 m"],end=["6 m","4 m"]}]', "outline"),
+        ("programme.supports=[]", "support"),
+        ("numerics.stop_loose_blocks=true", "stop_loose_blocks"),
+        ('loading.speed="1 mm/s"', "either"),
+        ('domain.outline=[["0 m","0 m"],["8 m","5 m"],["8 m","0 m"],["0 m","5 m"]]', "cross"),
+    ],
+)
+def test_bad_programmes_are_refused(scene, setting, word):
+    with pytest.raises(BadInput) as refused:
+        dem_run.run(scene, scene.with_name("never.nc"), overrides=[setting])
+    assert any(word in str(f) for f in refused.value.faults)
