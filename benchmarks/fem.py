@@ -12,12 +12,12 @@ import time
 
 import numpy as np
 
-from graben.mechanics.continuum.body import Body, Material, make_body
-from graben.mechanics.continuum.mapped import mapped_mesh
-from graben.mechanics.continuum.newton import NewtonOptions, equilibrate, factorise
-from graben.mechanics.continuum.quads import body_force
-from graben.mechanics.continuum.sizing import SizeField
+from graben.mechanics.fem.body import Body, Material, make_body
+from graben.mechanics.fem.newton import NewtonOptions, equilibrate, factorise
+from graben.mechanics.fem.quads import body_force
 from graben.mechanics.materials.laws import LAWS, pack
+from graben.mechanics.meshes.mapped import mapped_mesh
+from graben.mechanics.meshes.sizing import SizeField
 
 CORNERS = np.array([(x, y) for y in (0, 20) for x in (0, 30, 80)] + [(40, 50), (80, 50)], float)
 PATCHES = np.array([(0, 1, 4, 3), (1, 2, 5, 4), (4, 5, 7, 6)])

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from graben.mechanics.fitting.curves import Curve, CurveFit
 from graben.mechanics.materials.laws import LAWS, pack, update
 from graben.mechanics.materials.point import follow
-from graben.mechanics.search.curves import Curve, CurveFit
-from graben.mechanics.search.multistart import Plan, search
-from graben.mechanics.search.space import Box
+from graben.mechanics.optimise.multistart import Plan, search
+from graben.mechanics.optimise.space import Box
 
 DP = {
     "young_modulus": 1.8e9,

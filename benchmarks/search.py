@@ -25,8 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from graben.mechanics.search.choices import METHODS, explore
-from graben.mechanics.search.multistart import search, sum_of_squares
+from graben.mechanics.optimise.choices import METHODS, explore
+from graben.mechanics.optimise.multistart import search, sum_of_squares
 from graben.schemas.scene import load_scene
 from graben.stages.calibrate.measured import Reading, read_measured
 from graben.stages.calibrate.problem import problem_of

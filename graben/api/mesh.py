@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from graben.api.units import si
 from graben.errors import BadInput, Fault, Refused
-from graben.mechanics.continuum.mapped import mapped_mesh
-from graben.mechanics.continuum.mesh2d import QuadMesh
-from graben.mechanics.continuum.paved import paved_mesh
-from graben.mechanics.continuum.sizing import SizeField
+from graben.mechanics.meshes.mapped import mapped_mesh
+from graben.mechanics.meshes.mesh2d import QuadMesh
+from graben.mechanics.meshes.paved import paved_mesh
+from graben.mechanics.meshes.sizing import SizeField
 
 __all__ = ["QuadMesh", "mapped", "paved", "read", "rectangle"]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from graben.api.materials import Material
 from graben.api.scenes import scene
 from graben.api.units import in_units
-from graben.mechanics.continuum.mesh2d import QuadMesh
+from graben.mechanics.meshes.mesh2d import QuadMesh
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ def plane_analysis(
     BadInput : every fault of supports, loads and stepping
     NumericsFailed : no equilibrium under gravity, or before the end where ``goal`` is "end"
     """
-    from graben.mechanics.continuum.body import Material as Filling
+    from graben.mechanics.fem.body import Material as Filling
     from graben.stages.fem_run.sizes import sizes_of
     from graben.stages.fem_run.stage import Analysis, problem_of
     from graben.stages.shared.estimate import refuse_too_large

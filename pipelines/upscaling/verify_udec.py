@@ -76,7 +76,7 @@ def udec_curves() -> dict[float, tuple[Any, Any]]:
     """Confinement -> stress and strain since the first state (states, 2) as xx, yy, compression positive."""
     import numpy as np
 
-    from graben.mechanics.search.curves import since_first
+    from graben.mechanics.fitting.curves import since_first
 
     with open(HERE / "reference" / "udec_voronoi_granite_fit.csv", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
@@ -91,7 +91,7 @@ def udec_curves() -> dict[float, tuple[Any, Any]]:
 
 def our_curves(path: Path) -> tuple[Any, Any]:
     """Stress and strain since the first state (states, 2) of an artifact of one path, compression positive."""
-    from graben.mechanics.search.curves import since_first
+    from graben.mechanics.fitting.curves import since_first
     from graben.schemas.artifact import read_artifact
 
     data = read_artifact(path, "curves")

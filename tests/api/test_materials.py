@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import graben
+from graben.mechanics.fitting.curves import Curve, CurveFit
 from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE
 from graben.mechanics.materials.laws import LAWS, update
-from graben.mechanics.search.curves import Curve, CurveFit
 from graben.schemas.scenes.material import UNITS
 from tests.api.laws import STEEL, VOCE, voce
 

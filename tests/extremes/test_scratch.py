@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from graben.errors import NumericsFailed
-from graben.mechanics.continuum.scratch.mesh import specimen
-from graben.mechanics.continuum.scratch.run import Numerics, ScratchFailed, Tip, simulate
 from graben.mechanics.materials.laws import LAWS, pack
+from graben.mechanics.scratch.mesh import specimen
+from graben.mechanics.scratch.run import Numerics, ScratchFailed, Tip, simulate
 
 QUICK = {"indent_speed": 0.01, "slide_speed": 0.05, "lift_speed": 0.02, "rest_steps": 100}
 

@@ -67,7 +67,7 @@ def test_processes_may_fill_the_cache_side_by_side(house):
 
 
 def test_digests_follow_imports_from_room_to_room():
-    assert "graben.mechanics.materials.point" in compiled._imported("graben.mechanics.search.curves")
+    assert "graben.mechanics.materials.point" in compiled._imported("graben.mechanics.fitting.curves")
     for stored in (
         compiled.digest_of_sources,
         compiled._imported,

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from graben.mechanics.continuum.body import Material, make_body
-from graben.mechanics.continuum.mapped import mapped_mesh
-from graben.mechanics.continuum.march import StepOptions, march
-from graben.mechanics.continuum.newton import NewtonOptions
-from graben.mechanics.continuum.quads import edge_traction
-from graben.mechanics.continuum.sizing import SizeField
+from graben.mechanics.fem.body import Material, make_body
+from graben.mechanics.fem.march import StepOptions, march
+from graben.mechanics.fem.newton import NewtonOptions
+from graben.mechanics.fem.quads import edge_traction
 from graben.mechanics.materials.laws import LAWS, pack
+from graben.mechanics.meshes.mapped import mapped_mesh
+from graben.mechanics.meshes.sizing import SizeField
 
 PRANDTL = 2.0 + np.pi
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from graben.mechanics.continuum.scratch.mesh import specimen
-from graben.mechanics.continuum.scratch.run import Numerics, ScratchRun, Tip, simulate
 from graben.mechanics.materials.laws import LAWS, pack
+from graben.mechanics.scratch.mesh import specimen
+from graben.mechanics.scratch.run import Numerics, ScratchRun, Tip, simulate
 from graben.mechanics.wear.groove import Section, cut, measure
 
 pytestmark = pytest.mark.verify

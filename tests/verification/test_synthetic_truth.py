@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from graben.mechanics.fitting.curves import Curve, CurveFit, Weights
+from graben.mechanics.fitting.first_state import settle
+from graben.mechanics.fitting.identifiability import UNSEEN, identify
+from graben.mechanics.fitting.objective import Objective, Priors
 from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.materials.point import drive
-from graben.mechanics.search.curves import Curve, CurveFit, Weights
-from graben.mechanics.search.first_state import settle
-from graben.mechanics.search.identifiability import UNSEEN, identify
-from graben.mechanics.search.levenberg_marquardt import jacobian, levenberg_marquardt
-from graben.mechanics.search.objective import Objective, Priors
-from graben.mechanics.search.space import Box
+from graben.mechanics.optimise.levenberg_marquardt import jacobian, levenberg_marquardt
+from graben.mechanics.optimise.space import Box
 
 LAW = LAWS["drucker-prager"]
 TRUTH = {

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from graben.errors import Refused
 from graben.mechanics.averaging.network import Network
-from graben.mechanics.rings import refuse_crossing
+from graben.mechanics.plane.rings import refuse_crossing
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from graben.errors import Refused
-from graben.mechanics.blocks.polygons import distance_to_sides
 from graben.mechanics.blocks.tessellation import Tessellation
+from graben.mechanics.plane.polygons import distance_to_sides
 
 # A corner that turns less than this is no corner: neither chamfered nor counted [rad].
 _STRAIGHT = np.radians(15.0)

@@ -16,9 +16,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from graben.errors import Refused
-from graben.mechanics.blocks.polygons import distance_to_sides
 from graben.mechanics.blocks.tessellation import equal_points
-from graben.mechanics.rings import place, refuse_crossing
+from graben.mechanics.plane.polygons import distance_to_sides
+from graben.mechanics.plane.rings import place, refuse_crossing
 
 # Corners that miss each other, or an edge, by less than this share of the median edge are meant to meet.
 SNAP = 1e-3

@@ -10,7 +10,7 @@ import numpy as np
 from graben.mechanics.blocks import relaxation as rx
 from graben.mechanics.blocks.model import BlockModel
 from graben.mechanics.blocks.nodes import scatter_nodes
-from graben.mechanics.blocks.polygons import areas_and_centroids, inside
+from graben.mechanics.plane.polygons import areas_and_centroids, inside
 
 
 def blocks_in(model: BlockModel, polygon: np.ndarray) -> np.ndarray:

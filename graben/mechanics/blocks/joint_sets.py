@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from graben.mechanics.blocks import polygons
+from graben.mechanics.plane import polygons
 
 
 @dataclass(frozen=True)

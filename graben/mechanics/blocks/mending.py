@@ -18,7 +18,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from graben.errors import Refused
-from graben.mechanics.blocks import polygons
 from graben.mechanics.blocks.tessellation import (
     Marks,
     Mending,
@@ -29,7 +28,8 @@ from graben.mechanics.blocks.tessellation import (
     from_rings,
     shared_points,
 )
-from graben.mechanics.rings import STRAIGHT, refuse_crossing
+from graben.mechanics.plane import polygons
+from graben.mechanics.plane.rings import STRAIGHT, refuse_crossing
 
 # A joint that turns by less has kept its direction [rad].
 _TURNED = np.radians(0.1)

@@ -18,8 +18,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Voronoi, cKDTree
 
 from graben.errors import Refused
-from graben.mechanics.blocks import polygons
-from graben.mechanics.rings import refuse_crossing
+from graben.mechanics.plane import polygons
+from graben.mechanics.plane.rings import refuse_crossing
 
 # Mean block area over the square of the nominal edge: UDEC's generator made 419 blocks on 100 m2 for 0.5 m.
 AREA_PER_EDGE_SQUARED = 100.0 / 419.0 / 0.25

@@ -65,7 +65,7 @@ from graben.mechanics.materials.drucker_prager_return import ROOT32, apex_flow, 
 from graben.mechanics.materials.elastic import add_elastic, fill_elastic, finite, moduli
 from graben.mechanics.materials.hardening import BARCELONA, EXPONENTIAL, barcelona_coefficients
 from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law
-from graben.mechanics.materials.principal import (
+from graben.mechanics.tensors.principal import (
     back_plane_stress,
     back_plane_tangent,
     back_space_stress,

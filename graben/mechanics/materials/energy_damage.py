@@ -32,7 +32,7 @@ from graben.mechanics.materials.elastic import POISSON, YOUNG, add_elastic, fini
 from graben.mechanics.materials.j2 import fill_tangent
 from graben.mechanics.materials.j2_hardening import FORMS, hardening_faults, return_to_strength
 from graben.mechanics.materials.law import NOT_FINITE, OK, Law, Parameter
-from graben.mechanics.materials.principal import (
+from graben.mechanics.tensors.principal import (
     back_plane_stress,
     back_space_stress,
     split_plane,

@@ -33,7 +33,7 @@ from graben.mechanics.materials.elastic import POISSON, YOUNG, finite
 from graben.mechanics.materials.j2 import fill_tangent
 from graben.mechanics.materials.j2_hardening import HARDENING, hardening_faults, return_to_table
 from graben.mechanics.materials.law import NOT_FINITE, OK, Law, Parameter
-from graben.mechanics.materials.principal import back_space_stress, split_space
+from graben.mechanics.tensors.principal import back_space_stress, split_space
 
 MAX_STEP = 4
 TABLE = 6

@@ -46,7 +46,7 @@ from graben.mechanics.materials.lubliner_curves import (
     inelastic_strain,
     tension_rate,
 )
-from graben.mechanics.materials.principal import (
+from graben.mechanics.tensors.principal import (
     back_plane_stress,
     back_plane_tangent,
     back_space_stress,

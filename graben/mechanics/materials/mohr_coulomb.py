@@ -24,7 +24,7 @@ import numpy as np
 from graben.mechanics.compiled import kernel
 from graben.mechanics.materials.elastic import POISSON, YOUNG, add_elastic, fill_elastic, finite, moduli
 from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law, Parameter
-from graben.mechanics.materials.principal import (
+from graben.mechanics.tensors.principal import (
     back_plane_stress,
     back_plane_tangent,
     back_space_stress,

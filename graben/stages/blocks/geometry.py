@@ -16,10 +16,10 @@ from graben.mechanics.blocks import coverage
 from graben.mechanics.blocks.compression import rectangle_sides
 from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets
 from graben.mechanics.blocks.mending import mend
-from graben.mechanics.blocks.polygons import signed_area
 from graben.mechanics.blocks.tessellation import Tessellation, voronoi_blocks, without
-from graben.mechanics.local_frame import local_origin
-from graben.mechanics.rings import refuse_crossing, turning_corners
+from graben.mechanics.plane.local_frame import local_origin
+from graben.mechanics.plane.polygons import signed_area
+from graben.mechanics.plane.rings import refuse_crossing, turning_corners
 from graben.schemas.polygon_file import Polygons, read_polygons
 from graben.schemas.scenes.blocks import BlocksScene
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from graben.mechanics.search.curves import Curve
+from graben.mechanics.fitting.curves import Curve
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.stages.calibrate.problem import Problem, problem_of

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault
-from graben.mechanics.search.curves import Curve, since_first
+from graben.mechanics.fitting.curves import Curve, since_first
 from graben.schemas.artifact import read_artifact
 from graben.schemas.text_table import TextTable, read_text_table
 from graben.stages.calibrate.measured_columns import AXES, EXPECTED, NEEDED, Columns, read_columns, understood

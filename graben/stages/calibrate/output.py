@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from graben.mechanics.fitting.agreement import Agreement, rank
+from graben.mechanics.fitting.curves import Curve, CurveFit
+from graben.mechanics.fitting.identifiability import Identifiability
 from graben.mechanics.materials.laws import LAWS
-from graben.mechanics.search.agreement import Agreement, rank
-from graben.mechanics.search.curves import Curve, CurveFit
-from graben.mechanics.search.identifiability import Identifiability
-from graben.mechanics.search.multistart import Found
-from graben.mechanics.search.space import Box
+from graben.mechanics.optimise.multistart import Found
+from graben.mechanics.optimise.space import Box
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.stages.calibrate.compare import Candidate
 from graben.stages.calibrate.problem import Problem

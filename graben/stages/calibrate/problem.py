@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault
+from graben.mechanics.fitting.curves import Curve, CurveFit, Weights
+from graben.mechanics.fitting.objective import Objective, Priors
 from graben.mechanics.materials.laws import LAWS
-from graben.mechanics.search.choices import fewest
-from graben.mechanics.search.curves import Curve, CurveFit, Weights
-from graben.mechanics.search.multistart import Found, Plan, search
-from graben.mechanics.search.objective import Objective, Priors
-from graben.mechanics.search.space import Box
+from graben.mechanics.optimise.choices import fewest
+from graben.mechanics.optimise.multistart import Found, Plan, search
+from graben.mechanics.optimise.space import Box
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.stages.calibrate.state import State
 from graben.stages.calibrate.workers import Sent

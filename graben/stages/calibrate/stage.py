@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from graben.errors import BadInput, Fault, Incomplete, Refused
+from graben.mechanics.fitting.agreement import agreement
+from graben.mechanics.fitting.curves import Curve
+from graben.mechanics.fitting.first_state import settle
+from graben.mechanics.fitting.identifiability import identify
 from graben.mechanics.materials.laws import LAWS
-from graben.mechanics.search.agreement import agreement
-from graben.mechanics.search.curves import Curve
-from graben.mechanics.search.first_state import settle
-from graben.mechanics.search.identifiability import identify
 from graben.schemas.files import together
 from graben.schemas.layouts.calibration import LAYOUT
 from graben.schemas.outputs import MATERIAL, PARTIAL, STATE, Outputs, beside, files_of

@@ -11,7 +11,7 @@ import numpy as np
 
 import graben
 from graben.errors import BadInput, Fault
-from graben.mechanics.search.multistart import Help, Start
+from graben.mechanics.optimise.multistart import Help, Start
 from graben.schemas.provenance import sha256_of
 from graben.schemas.saved import Arrays, read_saved, write_saved
 from graben.stages.calibrate.workers import Workers

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from graben.errors import BadInput, Fault, Refused
-from graben.mechanics.continuum.mapped import mapped_mesh
-from graben.mechanics.continuum.mesh2d import QuadMesh
-from graben.mechanics.continuum.one_body import NotOneBody, one_body
-from graben.mechanics.continuum.paved import paved_mesh
-from graben.mechanics.continuum.sizing import SizeField
+from graben.mechanics.meshes.mapped import mapped_mesh
+from graben.mechanics.meshes.mesh2d import QuadMesh
+from graben.mechanics.meshes.one_body import NotOneBody, one_body
+from graben.mechanics.meshes.paved import paved_mesh
+from graben.mechanics.meshes.sizing import SizeField
 from graben.schemas.mesh_file import read_plane_mesh
 from graben.schemas.scenes.fem import FemScene
 

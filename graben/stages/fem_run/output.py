@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from graben.mechanics.continuum.body import Body, State
-from graben.mechanics.continuum.march import March
-from graben.mechanics.continuum.mesh2d import QuadMesh
-from graben.mechanics.continuum.newton import Step
-from graben.mechanics.continuum.surface import free_surface
+from graben.mechanics.fem.body import Body, State
+from graben.mechanics.fem.march import March
+from graben.mechanics.fem.newton import Step
+from graben.mechanics.fem.surface import free_surface
+from graben.mechanics.meshes.mesh2d import QuadMesh
 from graben.schemas.artifact import write_artifact
 from graben.schemas.files import together
 from graben.schemas.layouts.fem import LAYOUT

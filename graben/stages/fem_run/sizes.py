@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from graben.mechanics.continuum.sizing import SizeField
+from graben.mechanics.meshes.sizing import SizeField
 from graben.schemas.scenes.fem import FemScene
 from graben.stages.fem_run.mesh import size_field
 from graben.stages.shared.estimate import Estimate, tiles, work

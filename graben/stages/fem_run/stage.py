@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault, NumericsFailed, Refused
-from graben.mechanics.continuum.body import Body, Material, State, make_body
-from graben.mechanics.continuum.march import March, StepOptions, march
-from graben.mechanics.continuum.mesh2d import QuadMesh
-from graben.mechanics.continuum.newton import NewtonOptions, Step
-from graben.mechanics.continuum.quads import body_force, edge_traction
-from graben.mechanics.continuum.stability import softest_stiffness
+from graben.mechanics.fem.body import Body, Material, State, make_body
+from graben.mechanics.fem.march import March, StepOptions, march
+from graben.mechanics.fem.newton import NewtonOptions, Step
+from graben.mechanics.fem.quads import body_force, edge_traction
+from graben.mechanics.fem.stability import softest_stiffness
+from graben.mechanics.meshes.mesh2d import QuadMesh
 from graben.schemas.outputs import LAST_GOOD, SERIES, Outputs, beside, files_of
 from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.fem import FemScene

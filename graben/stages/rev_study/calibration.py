@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault, Refused
+from graben.mechanics.fitting.curves import Curve, CurveFit, Weights
+from graben.mechanics.fitting.identifiability import identify
 from graben.mechanics.materials.laws import LAWS
-from graben.mechanics.search.curves import Curve, CurveFit, Weights
-from graben.mechanics.search.identifiability import identify
-from graben.mechanics.search.levenberg_marquardt import jacobian
-from graben.mechanics.search.multistart import Found, Plan, search
-from graben.mechanics.search.space import Box
+from graben.mechanics.optimise.levenberg_marquardt import jacobian
+from graben.mechanics.optimise.multistart import Found, Plan, search
+from graben.mechanics.optimise.space import Box
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.rev_study import RevStudyScene
 from graben.stages.shared.record import Progress

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault
-from graben.mechanics.continuum.scratch import run as mechanics
-from graben.mechanics.continuum.scratch.mesh import HexMesh, cells_along, specimen
 from graben.mechanics.materials.law import Law
 from graben.mechanics.materials.laws import LAWS
+from graben.mechanics.scratch import run as mechanics
+from graben.mechanics.scratch.mesh import HexMesh, cells_along, specimen
 from graben.schemas.outputs import LAST_GOOD, PARTIAL, SERIES, Outputs, files_of
 from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.scratch import ScratchScene

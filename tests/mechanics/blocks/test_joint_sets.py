@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from graben.errors import Refused
-from graben.mechanics.blocks import polygons
 from graben.mechanics.blocks.bodies import build_bodies
 from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets, split
 from graben.mechanics.blocks.mending import mend
 from graben.mechanics.blocks.tessellation import edges_of
+from graben.mechanics.plane import polygons
 
 SLOPE = np.array([(0, 0), (8, 0), (8, 5), (4, 5), (3, 2), (0, 2)], dtype=float)
 COMB = np.array(

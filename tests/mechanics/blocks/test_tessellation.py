@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from graben.mechanics.blocks import polygons
 from graben.mechanics.blocks.tessellation import voronoi_blocks
+from graben.mechanics.plane import polygons
 
 SQUARE = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]])
 SLOPE = np.array([(0, 0), (80, 0), (80, 50), (40, 50), (30, 20), (0, 20)], dtype=float)

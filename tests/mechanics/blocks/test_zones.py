@@ -5,8 +5,8 @@ import pytest
 
 from graben.mechanics.blocks import zones
 from graben.mechanics.blocks.bodies import build_bodies, ear_clip
-from graben.mechanics.blocks.polygons import signed_area
 from graben.mechanics.blocks.tessellation import voronoi_blocks
+from graben.mechanics.plane.polygons import signed_area
 
 SQUARE = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
 

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import lambertw
 
+from graben.mechanics.fitting.curves import Curve, CurveFit
 from graben.mechanics.materials.laws import LAWS, pack, update
 from graben.mechanics.materials.lubliner import steepest_dilation
 from graben.mechanics.materials.lubliner_curves import (
@@ -21,7 +22,6 @@ from graben.mechanics.materials.lubliner_curves import (
     tension_rate,
 )
 from graben.mechanics.materials.point import follow
-from graben.mechanics.search.curves import Curve, CurveFit
 
 LAW = LAWS["lubliner"]
 NONE = np.zeros((0, 0))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from graben.mechanics.search.curves import since_first
+from graben.mechanics.fitting.curves import since_first
 
 
 def draw(dataset: Any, figure: Any) -> None:

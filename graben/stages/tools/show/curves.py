@@ -6,7 +6,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from graben.mechanics.search.curves import since_first
+from graben.mechanics.fitting.curves import since_first
 
 
 def draw(dataset: xarray.Dataset, figure: Figure) -> None:

@@ -1,1 +1,0 @@
-"""Scratch test: 3D hexahedra, explicit in time, current configuration, contact with a rigid sphere."""

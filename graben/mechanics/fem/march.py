@@ -1,0 +1,189 @@
+"""Adaptive load steps through time, up to the end or up to the load that cannot be carried."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from graben.mechanics.fem.body import Body, State
+from graben.mechanics.fem.newton import Drag, NewtonOptions, Step, equilibrate
+
+_COARSE = 0.1  # of the march: steps that are too long to say where an overload begins
+_RESOLVED = 50  # steps that an end of the march is resolved by
+_LEAST = 1e-12  # of the smallest step: the first step is no smaller
+_DOWN = 0.1  # of a first step that failed, below the smallest
+
+
+@dataclass(frozen=True)
+class StepOptions:
+    """Length of the steps, s of load time.
+
+    first, largest, smallest : a step that fails is halved; below `smallest` the march ends
+    easy, hard : iterations below which the next step grows by half, and above which it shrinks by a third
+    extrapolate : start each step from the last increment, scaled
+    resolve : find an early end too, to 2 %: `smallest` is at most a fiftieth of what was marched, and before
+        the first step a trillionth of itself
+    """
+
+    first: float
+    largest: float
+    smallest: float
+    easy: int = 6
+    hard: int = 12
+    extrapolate: bool = True
+    resolve: bool = False
+
+    def __post_init__(self) -> None:
+        if not 0 < self.smallest <= self.first <= self.largest:
+            raise ValueError("step lengths must satisfy 0 < smallest <= first <= largest")
+
+    def least_after(self, marched: float) -> float:
+        """Length below which a step that fails is not halved again, s."""
+        if not self.resolve:
+            return self.smallest
+        return min(self.smallest, marched / _RESOLVED) if marched > 0.0 else self.smallest * _LEAST
+
+
+@dataclass
+class March:
+    """What a march went through.
+
+    Attributes
+    ----------
+    time, state, force, drag : the last equilibrium, its internal and its viscous forces
+    complete : whether the end time was reached
+    reason : why the last attempt failed (empty when complete)
+    iterations, residuals : per accepted step: factorisations and their residuals
+    rejected : number of attempts that failed
+    factorisations : of all attempts
+    external_work, internal_work, drag_work : J per metre
+    """
+
+    time: float
+    state: State
+    force: np.ndarray
+    drag: np.ndarray
+    complete: bool = False
+    reason: str = ""
+    iterations: list[int] = field(default_factory=list)
+    residuals: list[tuple[float, ...]] = field(default_factory=list)
+    rejected: int = 0
+    factorisations: int = 0
+    external_work: float = 0.0
+    internal_work: float = 0.0
+    drag_work: float = 0.0
+
+    def energy_error(self) -> float:
+        """Work of loads and supports against work of the stresses, relative; 0 before anything moved."""
+        work = max(abs(self.external_work), abs(self.internal_work))
+        return abs(self.external_work - self.internal_work - self.drag_work) / work if work > 0 else 0.0
+
+
+def march(
+    body: Body,
+    start: State,
+    external: Callable[[float], np.ndarray],
+    begin: float,
+    end: float,
+    steps: StepOptions,
+    newton: NewtonOptions,
+    *,
+    prescribed: Callable[[float], np.ndarray] | None = None,
+    save_times: np.ndarray | None = None,
+    relaxation: float = 0.0,
+    accepted: Callable[[float, State, np.ndarray, Step], None] | None = None,
+    overloaded: Callable[[float, Step], str | None] | None = None,
+) -> March:
+    """Follow the load history from `begin` to `end`, s.
+
+    Parameters
+    ----------
+    external : nodal loads (2 n,), N/m, at a time
+    prescribed : displacement of `body.fixed`, m, at a time; None: stays as it is in `start`
+    save_times : times that a step must end on
+    relaxation : relaxation time, s, of the viscous stabilisation (see `newton.Drag`); 0: none
+    accepted : called after each equilibrium with time, state, internal forces and the step
+    overloaded : told of each equilibrium before; a text that it returns makes this one the last, not complete, for
+        that reason. A step of more than a tenth of the march is halved first
+
+    Returns
+    -------
+    March; not complete when a step of the smallest length failed: the load of `time` is then the last carried
+    """
+    held = start.displacement[body.fixed].copy()
+    supports = prescribed if prescribed is not None else (lambda _t: held)
+    stops = np.array([end]) if save_times is None else np.append(np.asarray(save_times, dtype=float), end)
+    stops = np.unique(stops[(stops > begin) & (stops <= end)])
+    # At rest the forces that balance the stresses are the internal ones: no work is missed at the start.
+    force = body.respond(start, np.zeros(body.pattern.size), False).force
+    run = March(begin, start, force, np.zeros_like(force))
+    load = external(begin)
+    length, last_length = steps.first, 0.0
+    elastic = None
+    if relaxation > 0:
+        elastic = body.respond(body.untouched(), np.zeros(body.pattern.size), True).values
+        elastic_matrix = body.pattern.matrix(elastic)
+    last_increment: np.ndarray | None = None
+    while run.time < end:
+        stop = float(stops[np.searchsorted(stops, run.time, side="right")])
+        target = run.time + length
+        # A remainder shorter than a tenth of a step is taken along.
+        if target > stop - 0.1 * length:
+            target = stop
+        taken = target - run.time
+        guess = None
+        if steps.extrapolate and last_increment is not None:
+            guess = last_increment * (taken / last_length)
+        new_load = external(target)
+        resist = None if elastic is None else Drag(elastic_matrix, elastic, relaxation / taken)
+        step = equilibrate(body, run.state, new_load, supports(target), newton, guess, resist)
+        run.factorisations += step.iterations
+        if not step.converged and guess is not None:
+            # The path may have bent: once more from rest before the step is halved.
+            step = equilibrate(body, run.state, new_load, supports(target), newton, None, resist)
+            run.factorisations += step.iterations
+        ended = overloaded(target, step) if overloaded is not None and step.converged else None
+        if not step.converged or (ended and steps.resolve and taken > _COARSE * (target - begin)):
+            run.rejected += 1
+            run.reason = ended or step.reason
+            length = 0.5 * taken if run.iterations or taken > steps.smallest else _DOWN * taken
+            if length < steps.least_after(run.time - begin):
+                return run
+            continue
+        increment = step.state.displacement - run.state.displacement
+        _book(run, body, step, increment, load, new_load)
+        last_increment, last_length = increment, taken
+        run.time, run.state, run.force, load = target, step.state, step.force, new_load
+        run.iterations.append(step.iterations)
+        run.residuals.append(step.residuals)
+        if accepted is not None:
+            accepted(run.time, run.state, run.force, step)
+        if ended:
+            run.reason = ended
+            return run
+        if step.iterations <= steps.easy:
+            length = min(1.5 * max(length, taken), steps.largest)
+        elif step.iterations > steps.hard:
+            length = max(taken * 2 / 3, min(taken, steps.smallest))
+    run.complete, run.reason = True, ""
+    return run
+
+
+def _book(
+    run: March,
+    body: Body,
+    step: Step,
+    increment: np.ndarray,
+    load: np.ndarray,
+    new_load: np.ndarray,
+) -> None:
+    """Add a step to the energy ledger: loads on free, supports on fixed degrees of freedom; trapezoidal."""
+    resist = np.zeros_like(load) if step.drag is None else 0.5 * (run.drag + step.drag)
+    mean = 0.5 * (load + new_load)
+    mean[body.fixed] = (0.5 * (run.force + step.force) + resist)[body.fixed]
+    run.external_work += float(mean @ increment)
+    run.internal_work += body.internal_work(run.state, step.state)
+    run.drag_work += float(resist @ increment)
+    run.drag = resist if step.drag is None else step.drag

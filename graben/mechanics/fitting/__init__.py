@@ -1,0 +1,1 @@
+"""Curves, the objective of a fit, what the curves can tell, and whether starts agree."""

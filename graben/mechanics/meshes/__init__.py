@@ -1,0 +1,1 @@
+"""Plane meshes: mapped, paved, sized; each checked as one body."""

@@ -1,0 +1,1 @@
+"""Geometry in the plane: polygons, rings, the local frame of a body far from zero."""

@@ -1,0 +1,1 @@
+"""One grain scratches a specimen: bricks in space, contact, explicit steps, frames."""

@@ -1,0 +1,1 @@
+"""Principal values and directions of symmetric tensors."""
