@@ -16,7 +16,7 @@ from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.scratch.body import Body
 from graben.mechanics.scratch.mesh import specimen
 from graben.mechanics.scratch.motion import Phase, phase_rows
-from graben.mechanics.scratch.run import Numerics, Tip
+from graben.mechanics.scratch.setup import Numerics, Tip
 
 STEEL = [[0.0, 380e6], [0.05, 483e6], [0.2, 589e6], [1.0, 762e6]]
 

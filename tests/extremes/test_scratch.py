@@ -8,7 +8,8 @@ import pytest
 from graben.errors import NumericsFailed
 from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.scratch.mesh import specimen
-from graben.mechanics.scratch.run import Numerics, ScratchFailed, Tip, simulate
+from graben.mechanics.scratch.run import ScratchFailed, simulate
+from graben.mechanics.scratch.setup import Numerics, Tip
 
 QUICK = {"indent_speed": 0.01, "slide_speed": 0.05, "lift_speed": 0.02, "rest_steps": 100}
 

@@ -7,7 +7,8 @@ import pytest
 
 from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.scratch.mesh import specimen
-from graben.mechanics.scratch.run import Numerics, ScratchRun, Tip, simulate
+from graben.mechanics.scratch.run import ScratchRun, simulate
+from graben.mechanics.scratch.setup import Numerics, Tip
 from graben.mechanics.wear.groove import Section, cut, measure
 
 pytestmark = pytest.mark.verify

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time as clock_module
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,15 +10,14 @@ from graben.errors import NumericsFailed
 from graben.mechanics.compiled import kernel
 from graben.mechanics.scratch.contact import sphere_contact
 from graben.mechanics.scratch.eight_points import forces_eight_points
+from graben.mechanics.scratch.frame import Snapshot, stress_in_space
 from graben.mechanics.scratch.geometry import shape_gradient, volume_gradient
 from graben.mechanics.scratch.mesh import Floats, HexMesh
 from graben.mechanics.scratch.motion import tip_position
 from graben.mechanics.scratch.one_point import EXTERNAL, KINETIC, LEDGER_SIZE, forces_one_point
+from graben.mechanics.scratch.setup import Damage, Numerics, Tip
 from graben.mechanics.scratch.stepping import kick_and_drift, kinetic_energy, refresh
 from graben.mechanics.scratch.surface import bared_supports, contact_stiffness, exposed_faces
-
-if TYPE_CHECKING:
-    from graben.mechanics.scratch.run import Damage, Numerics, Snapshot, Tip
 
 
 def elastic_moduli(par: Floats) -> tuple[float, float]:
@@ -229,7 +227,6 @@ class Body:
 
     def snapshot(self, name: str) -> Snapshot:
         """Copy of the present state for pictures and sections."""
-        from graben.mechanics.scratch.run import Snapshot, stress_in_space
 
         tip = np.zeros(3)
         tip_position(self.time, self.phases, self.origin, tip)

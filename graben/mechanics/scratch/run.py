@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graben.errors import NumericsFailed
 from graben.mechanics.scratch.body import Body, elastic_moduli
+from graben.mechanics.scratch.frame import Snapshot
 from graben.mechanics.scratch.mesh import Floats, HexMesh, Ints
 from graben.mechanics.scratch.motion import Phase, phase_rows
 from graben.mechanics.scratch.one_point import (
@@ -25,75 +25,11 @@ from graben.mechanics.scratch.one_point import (
     TANGENTIAL,
     VISCOUS,
 )
+from graben.mechanics.scratch.setup import Damage, Numerics, Tip
 
 ENERGIES = (
     "external", "internal", "kinetic", "friction", "contact", "hourglass", "viscous", "damping", "added_mass"
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Tip:
-    """Rigid sphere: radius [m], Coulomb friction, x of the indentation [m], depth [m] and path [m]."""
-
-    radius: float
-    friction: float
-    start: float
-    depth: float
-    path: float
-
-
-@dataclass(frozen=True)
-class Numerics:
-    """What trades accuracy for time. Speeds are shares of the longitudinal wave speed.
-
-    points 1 or 8 per element; safety on the step; floor: share of the first step below which elements get mass;
-    mass_cap: largest added share of the specimen's mass before the run stops; refresh: steps between refreshes;
-    hourglass factor (1 is about the elastic bending stiffness), linear bulk viscosity; penalty factor on E A / h;
-    volume_limit: |det F - 1| at which a run without damage stops; energy_limit: share of the external work.
-    """
-
-    points: int = 1
-    indent_speed: float = 0.003
-    slide_speed: float = 0.02
-    lift_speed: float = 0.006
-    rest_steps: int = 400
-    safety: float = 0.8
-    floor: float = 0.3
-    mass_cap: float = 0.05
-    refresh: int = 25
-    hourglass: float = 0.02
-    viscosity: float = 0.06
-    penalty: float = 0.5
-    volume_limit: float = 0.02
-    energy_limit: float = 0.03
-
-
-@dataclass(frozen=True)
-class Damage:
-    """Rate limit and removal: growth per external work [1/J, whole specimen], H (6.98), and the damage at which
-    an element is removed. step_slot is the slot of the law's par that takes the limit."""
-
-    per_work: float
-    remove_at: float
-    step_slot: int
-
-
-@dataclass
-class Snapshot:
-    """State of the body at one time: positions (n, 3), stress (e, 6) in space, p (e,), damage (e,), living (e,),
-    volumes (e,) [m3], exposed faces (f, 4), and the held faces (g, 4) that removal bared."""
-
-    name: str
-    time: float
-    tip: Floats
-    points: Floats
-    stress: Floats
-    plastic_strain: Floats
-    damage: Floats
-    alive: Ints
-    volumes: Floats
-    faces: Ints
-    supports: Ints
 
 
 @dataclass
@@ -288,12 +224,3 @@ def _rest(
         body.advance(steps)
         left -= steps
         rows.append((index, *_record(body, numerics, reference, damaged, False)))
-
-
-def stress_in_space(rotation: Floats, stress: Floats) -> Floats:
-    """Mean over points of R s R^T: rotation (e, p, 3, 3), stress (e, p, 6) -> (e, 6)."""
-    full = np.empty((*stress.shape[:2], 3, 3))
-    for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))):
-        full[..., i, j] = full[..., j, i] = stress[..., k]
-    turned: NDArray[np.float64] = np.einsum("epij,epjk,eplk->epil", rotation, full, rotation).mean(axis=1)
-    return np.stack([turned[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))], axis=1)

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from graben.mechanics.scratch.frame import Snapshot
 from graben.mechanics.scratch.mesh import HexMesh
-from graben.mechanics.scratch.run import ENERGIES, ScratchRun, Snapshot
+from graben.mechanics.scratch.run import ENERGIES, ScratchRun
 from graben.mechanics.wear.groove import Section, VolumeLedger, cut, measure, volume_ledger
 from graben.schemas.files import together
 from graben.schemas.layouts.scratch import LAYOUT

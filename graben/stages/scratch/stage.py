@@ -12,6 +12,7 @@ from graben.mechanics.materials.law import Law
 from graben.mechanics.materials.laws import LAWS
 from graben.mechanics.scratch import run as mechanics
 from graben.mechanics.scratch.mesh import HexMesh, cells_along, specimen
+from graben.mechanics.scratch.setup import Damage, Numerics, Tip
 from graben.schemas.outputs import LAST_GOOD, PARTIAL, SERIES, Outputs, files_of
 from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.scratch import ScratchScene
@@ -69,7 +70,7 @@ def run(
             par,
             law.initial_state(par),
             scene.specimen.density,
-            mechanics.Tip(scene.tip.radius, scene.tip.friction, scene.tip.start, scene.tip.depth, scene.tip.path),
+            Tip(scene.tip.radius, scene.tip.friction, scene.tip.start, scene.tip.depth, scene.tip.path),
             numerics_of(scene),
             _damage(scene, law),
             scene.output.frames,
@@ -154,11 +155,11 @@ def mesh_of(scene: ScratchScene) -> HexMesh:
     )
 
 
-def numerics_of(scene: ScratchScene) -> mechanics.Numerics:
+def numerics_of(scene: ScratchScene) -> Numerics:
     """The run's numerics at the scene's fidelity."""
     n = scene.numerics
     factor = {"draft": n.draft_speed_factor, "standard": 1.0, "reference": n.reference_speed_factor}[scene.fidelity]
-    return mechanics.Numerics(
+    return Numerics(
         points=n.points,
         indent_speed=factor * n.indent_speed,
         slide_speed=factor * n.slide_speed,
@@ -192,10 +193,10 @@ def _slots(law: Law) -> tuple[int, int]:
     )
 
 
-def _damage(scene: ScratchScene, law: Law) -> mechanics.Damage | None:
+def _damage(scene: ScratchScene, law: Law) -> Damage | None:
     if scene.damage is None:
         return None
-    return mechanics.Damage(scene.damage.growth_per_joule, scene.damage.remove_at, law.index("max_damage_step"))
+    return Damage(scene.damage.growth_per_joule, scene.damage.remove_at, law.index("max_damage_step"))
 
 
 def _measures(headline: dict[str, Any]) -> list[Measure]:

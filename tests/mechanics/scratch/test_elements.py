@@ -10,10 +10,10 @@ import pytest
 from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.scratch.body import elastic_moduli, reference_gradients
 from graben.mechanics.scratch.eight_points import forces_eight_points
+from graben.mechanics.scratch.frame import stress_in_space
 from graben.mechanics.scratch.geometry import HOURGLASS, largest_face, shape_gradient, volume_gradient
 from graben.mechanics.scratch.mesh import CORNERS, brick
 from graben.mechanics.scratch.one_point import HOURGLASS_WORK, INTERNAL, LEDGER_SIZE, forces_one_point
-from graben.mechanics.scratch.run import stress_in_space
 
 YOUNG, NU = 210e9, 0.33
 ROOT = 1.0 / np.sqrt(3.0)

@@ -7,7 +7,8 @@ import pytest
 
 from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.scratch.mesh import specimen
-from graben.mechanics.scratch.run import Damage, Numerics, ScratchFailed, Tip, simulate
+from graben.mechanics.scratch.run import ScratchFailed, simulate
+from graben.mechanics.scratch.setup import Damage, Numerics, Tip
 from graben.mechanics.wear.groove import volume_ledger
 
 E, NU = 210e9, 0.33
