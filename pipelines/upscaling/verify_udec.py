@@ -33,7 +33,12 @@ UNITS = {"peak_pa": ("MPa", 1e6), "strain_at_peak": ("%", 0.01), "modulus_pa": (
 def fingerprint(scene: Path, fidelity: str) -> str:
     """A name for what decides the curves: the scene and the sources of the block model and of the averages."""
     package = HERE.parents[1] / "graben"
-    files = [*package.glob("mechanics/blocks/*.py"), *package.glob("mechanics/averaging/*.py"), scene]
+    files = [
+        *package.rglob("mechanics/blocks/*.py"),
+        *package.rglob("mechanics/averaging/*.py"),
+        *package.rglob("mechanics/plane/*.py"),
+        scene,
+    ]
     digest = hashlib.sha256(fidelity.encode())
     for file in sorted(files):
         digest.update(file.read_bytes())
