@@ -7,6 +7,7 @@ is used, so that no damaged index gets into compiled code.
 from __future__ import annotations
 
 import hashlib
+import io
 import logging
 from collections.abc import Mapping
 from pathlib import Path
@@ -30,7 +31,10 @@ def write_saved(path: Path, owner: Mapping[str, str], arrays: Mapping[str, Any])
     stored = {name: np.asarray(values) for name, values in {**owner, **arrays}.items()}
     try:
         with whole_file(path) as temporary:
-            np.savez(temporary, **stored, **{_DIGEST: np.array(_digest(stored))})  # type: ignore[arg-type]
+            # By way of memory: the archive of a file that is too large complains on stderr when it is forgotten.
+            archive = io.BytesIO()
+            np.savez(archive, **stored, **{_DIGEST: np.array(_digest(stored))})  # type: ignore[arg-type]
+            temporary.write_bytes(archive.getbuffer())
     except MachineFailed as error:
         logging.getLogger(__name__).warning("no state is kept: %s", error)
         return False
