@@ -131,7 +131,7 @@ def run(
     if strange:
         raise BadInput(strange)
     extra = {name: _files(value) if name not in ("cluster", "restart") else value for name, value in extra.items()}
-    module = import_module(f"graben.stages.{stage}")
+    module = import_module(f"graben.stages.{stage}.stage")
     first = [model]
     if model.kind == "rev-study":
         first = [extra.pop("inputs", []), model]

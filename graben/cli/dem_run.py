@@ -21,7 +21,7 @@ def main(
 
     Writes one NetCDF artifact, and VTU files with a PVD beside it for ParaView.
     """
-    from graben.stages import dem_run
+    from graben.stages.dem_run import stage as dem_run
 
     with session.progress() as progress:
         headline = dem_run.run(

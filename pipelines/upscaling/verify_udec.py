@@ -47,7 +47,7 @@ def fingerprint(scene: Path, fidelity: str) -> str:
 
 def one_curve(scene: Path, seed: int, confining: float, fidelity: str, output: Path) -> dict[str, float]:
     """Run one tessellation at one confinement and average it; returns the run's own error measures."""
-    from graben.stages import dem_run
+    from graben.stages.dem_run import stage as dem_run
     from graben.stages.homogenize import stage as homogenize
 
     blocks = output.with_name(output.name.replace("curves", "blocks"))

@@ -99,8 +99,8 @@ def small_text(scene: Path, overrides: list[str]) -> str:
 
 def _make_restart(folder: Path, straight: Path, scenes: Path) -> None:
     """What runs of blocks and of calibrate leave when they are interrupted halfway, and straight runs of them."""
-    from graben.stages import dem_run
     from graben.stages.calibrate import stage as calibrate
+    from graben.stages.dem_run import stage as dem_run
 
     for kind, stage, end in (("blocks", dem_run, "checkpoint"), ("calibrate", calibrate, "state")):
         scene, kept = folder / f"{kind}.toml", folder / f"{kind}.{end}.npz"

@@ -5,7 +5,7 @@ import pytest
 
 from graben.errors import BadInput
 from graben.schemas.artifact import read_artifact
-from graben.stages import dem_run
+from graben.stages.dem_run import stage as dem_run
 from graben.stages.homogenize import stage as homogenize
 from graben.stages.tools import picture
 from tests.stages.blocks.test_loading import stopped_and_straight

@@ -9,8 +9,8 @@ import pytest
 from graben.errors import BadInput
 from graben.schemas.artifact import read_artifact
 from graben.schemas.scene import load_scene
-from graben.stages import dem_run
 from graben.stages.blocks.geometry import lay_out
+from graben.stages.dem_run import stage as dem_run
 
 CELLS = [(x, y) for y in (0, 1) for x in (0, 1, 2)]
 

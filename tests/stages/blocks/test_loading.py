@@ -8,7 +8,7 @@ import xarray
 
 from graben.errors import BadInput
 from graben.schemas.artifact import check_artifact, read_artifact
-from graben.stages import dem_run
+from graben.stages.dem_run import stage as dem_run
 
 SQUARE = """
 kind = "blocks"

@@ -10,8 +10,8 @@ from graben.errors import BadInput
 from graben.schemas.artifact import read_artifact
 from graben.schemas.polygon_file import read_polygons
 from graben.schemas.scenes.blocks import Joints
-from graben.stages import dem_run
 from graben.stages.blocks.joints import joints_of_sets
+from graben.stages.dem_run import stage as dem_run
 
 BRICKS = [(x, y) for y in (0.0, 1.0, 2.0, 3.0) for x in (0.0, 1.0, 2.0, 3.0)]
 

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from graben.cli.dem_run import main
 from graben.errors import BadInput
 from graben.schemas.artifact import check_artifact, read_artifact
-from graben.stages import dem_run
+from graben.stages.dem_run import stage as dem_run
 
 SCENE = """
 kind = "particles"

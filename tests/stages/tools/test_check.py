@@ -7,8 +7,8 @@ import pytest
 from graben.errors import BadInput
 from graben.schemas.provenance import Record
 from graben.schemas.scene import load_scene
-from graben.stages import dem_run
 from graben.stages.calibrate import stage as calibrate
+from graben.stages.dem_run import stage as dem_run
 from graben.stages.fem_run import stage as fem_run
 from graben.stages.scratch import stage as scratch
 from graben.stages.tools.check import check, examine
