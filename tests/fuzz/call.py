@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-CHECK_S, STAGE_S, HUNG_S = 10.0, 1.0, 90.0
+CHECK_S, STAGE_S, HUNG_S = 60.0, 1.0, 400.0
 
 
 class Fault(AssertionError):

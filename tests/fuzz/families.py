@@ -64,7 +64,9 @@ def checkpoints(rng: random.Random, stock: Path, folder: Path) -> None:
     kind, output = kept.name.split(".")[0], folder / (kept.name.split(".")[0] + ".nc")
     command = {"blocks": "dem-run", "calibrate": "calibrate"}[kind]
     ran = call(command, folder / f"{kind}.toml", "-o", output, "--restart", "--json", "-q", seconds=5.0)
-    judge_output(ran, output)
+    # A digest that fits vouches for the numbers: only shapes and ranges can be seen.
+    if not edited:
+        judge_output(ran, output)
     if ran.code == 0 and not edited and not same_numbers(output, stock / "straight" / output.name):
         raise Fault("the restart ends elsewhere than the straight run")
 

@@ -77,7 +77,7 @@ class Problem:
             plan,
             seed=self.scene.seed,
             guesses=guesses,
-            help=state.help(task),
+            help=state.help(task, self.box.size),
             progress=tell,
         )
         return objective, replace(found, evaluations=found.evaluations + evaluations)
@@ -136,9 +136,8 @@ class Problem:
             )
             goal = Objective(fit, box, priors, self.scene.weights.noise, self.scene.correlation_length)
             guess = None if self.guesses is None else self.guesses[:, at]
-            found = search(
-                goal, len(names), short, seed=self.scene.seed, guesses=guess, help=state.help(f"{task}, {stage}")
-            )
+            done = state.help(f"{task}, {stage}", len(names))
+            found = search(goal, len(names), short, seed=self.scene.seed, guesses=guess, help=done)
             evaluations += found.evaluations
             known |= {n: float(v) for n, v in zip(names, box.to_values(found.best.x))}
         return self.box.to_unit(np.array([known[n] for n in self.box.names]))[None], evaluations

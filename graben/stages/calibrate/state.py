@@ -64,9 +64,15 @@ class State:
         evaluations = int(found["evaluations"])
         return Start(found["members"], found["values"], reasons, found["history"], evaluations)
 
-    def help(self, search: str) -> Help:
-        """For the search of that name: who evaluates, what is done, and where to put what gets done."""
+    def help(self, search: str, size: int) -> Help:
+        """For the search of that name over `size` parameters: who evaluates, what is done, where to put what gets
+        done. BadInput where what is done is none of such a search."""
         own = self.starts.setdefault(search, {})
+        for number, start in own.items():
+            sets = start.members
+            if sets.shape[1] != size or sets.min() < 0.0 or sets.max() > 1.0 or start.values.min() < 0.0:
+                expected = f"sets of {size} parameters, as fractions of their ranges, and sums of squares"
+                raise BadInput(Fault(str(self.path), f"{search}|{number}|members", "", expected))
 
         def keep(number: int, start: Start) -> None:
             own[number] = start

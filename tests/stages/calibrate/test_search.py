@@ -8,6 +8,7 @@ import pytest
 import xarray
 
 from graben.errors import BadInput
+from graben.schemas.saved import write_saved
 from graben.stages.calibrate import stage as calibrate
 from graben.stages.tools.check import check
 from tests.conftest import PIPELINES
@@ -92,6 +93,33 @@ def test_the_state_of_another_scene_is_refused(tmp_path):
     with pytest.raises(BadInput, match=": restart"):
         calibrate.run(SCENE, tmp_path / "o.nc", overrides=QUICK, restart=True)
     assert (tmp_path / "o.state.npz").read_bytes() == b"torn"
+
+
+@pytest.mark.parametrize(
+    ("table", "change"),
+    [
+        ("members", lambda found: found[:, :-1]),
+        ("members", lambda found: found[:, :0]),
+        ("members", lambda found: found + 2.0),
+        ("members", lambda found: found.astype("U8")),
+        ("values", lambda found: -found),
+        ("values", lambda found: found[:0]),
+        ("history", lambda found: found * np.nan),
+    ],
+)
+def test_a_state_whose_tables_are_none_of_the_search_is_refused(tmp_path, table, change):
+    def stop(fraction, words):
+        if "done" in words:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        calibrate.run(SCENE, tmp_path / "o.nc", overrides=QUICK, progress=stop)
+    with np.load(tmp_path / "o.state.npz") as data:
+        tables = {name: data[name] for name in data.files if name != "sha256"}
+    [name] = [name for name in tables if name.endswith(f"0|{table}")]
+    write_saved(tmp_path / "o.state.npz", {}, tables | {name: change(tables[name])})
+    with pytest.raises(BadInput, match=r"o\.state\.npz: .*\|0\|"):
+        calibrate.run(SCENE, tmp_path / "o.nc", overrides=QUICK, restart=True)
 
 
 def test_stages_begin_the_search_nearer_to_the_optimum(tmp_path):
