@@ -8,6 +8,7 @@ import pkgutil
 import random
 import shutil
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -42,9 +43,12 @@ def worker(pipe: Any, stock: Path) -> None:
     for module in pkgutil.walk_packages(graben.__path__, "graben."):
         importlib.import_module(module.name)
     warm(stock, Path(tempfile.mkdtemp(dir=stock.parent)))
-    while (task := pipe.recv()) is not None:
-        try:
-            one(*task, stock, keep=True)
-            pipe.send(None)
-        except BaseException as error:
-            pipe.send(f"{type(error).__name__}: {error}")
+    with suppress(EOFError, ConnectionError):  # the one who asked is no more
+        while True:
+            task = pipe.recv()
+            try:
+                one(*task, stock, keep=True)
+                answer = None
+            except BaseException as error:
+                answer = f"{type(error).__name__}: {error}"
+            pipe.send(answer)
