@@ -21,6 +21,18 @@ class _Parts(list[tuple[Path, Path]]):
     ends_run = False
 
 
+# Places that were free when a run was allowed to write there.
+_free: set[Path] = set()
+
+
+def expect_free(paths: Iterable[Path], free: bool) -> None:
+    """Note that nothing may be replaced at these places, or that it may."""
+    places = {path.absolute() for path in paths}
+    _free.difference_update(places)
+    if free:
+        _free.update(places)
+
+
 _waiting: ContextVar[_Parts | None] = ContextVar("files that wait to be renamed", default=None)
 
 
@@ -124,6 +136,9 @@ def _old_of(path: Path, process: int | None = None) -> Path:
 
 def _put_in_place(parts: _Parts) -> None:
     """Rename all. The last renaming decides: before it everything can be taken back, after it the rest is tidying."""
+    for _, target in parts:
+        if target.absolute() in _free and os.path.lexists(target):
+            raise MachineFailed(str(target), "another run has put its output there meanwhile")
     moved: list[tuple[Path, Path, Path]] = []
     seal = parts[-1][0]
     try:
@@ -143,6 +158,7 @@ def _put_in_place(parts: _Parts) -> None:
         _tidy(moved)
         raise
     _tidy(moved)
+    expect_free([target for _, target in parts], False)
 
 
 def _take_back(temporary: Path, target: Path, old: Path) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 
 from graben.errors import BadInput, Fault
 from graben.schemas.artifact_marks import seal_broken
-from graben.schemas.files import existing_folder, machine, part_of, recover, unfit
+from graben.schemas.files import existing_folder, expect_free, machine, part_of, recover, unfit
 
 # What is beside an artifact NAME.nc, by the end of its name.
 FOLDER, PVD, MATERIAL = ".vtu", ".pvd", ".material.toml"
@@ -92,6 +92,7 @@ class Outputs:
         faults += [f for p in (self.main, *self.others) for f in _among_fields(p)] if not faults else []
         if faults:
             raise BadInput(faults)
+        expect_free([p for p in paths if p not in kept], not overwrite)
         for path in {p.parent.absolute(): p for p in reversed(paths)}.values():
             _try_to_write(path)
 

@@ -2,6 +2,7 @@
 
 import os
 import socket
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -231,6 +232,20 @@ def test_a_working_folder_that_is_gone_is_the_machines_fault(tmp_path, monkeypat
     (tmp_path / "gone").rmdir()
     with pytest.raises(MachineFailed, match=r"a\.nc"):
         Outputs(Path("a.nc"), SERIES).claim([tmp_path / "scene.toml"])
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_what_another_run_wrote_meanwhile_is_replaced_by_overwrite_only(overwrite, tmp_path):
+    artifact = tmp_path / "a.nc"
+    Outputs(artifact, SERIES).claim([], overwrite=overwrite)
+    artifact.write_text("other")  # by another process
+    with nullcontext() if overwrite else pytest.raises(MachineFailed, match="meanwhile"), files.together():
+        fields(artifact)
+        with files.whole_file(artifact) as own:
+            own.write_text("own")
+    names = {p.name for p in tmp_path.iterdir()}
+    assert names == ({"a.nc", "a.vtu", "a.pvd"} if overwrite else {"a.nc"})
+    assert artifact.read_text() == ("own" if overwrite else "other")
 
 
 def test_what_a_stopped_run_kept_may_be_replaced_by_its_restart(tmp_path):
