@@ -16,7 +16,7 @@ def _length(text: str, argument: str) -> float:
     try:
         return to_si(text, "m")
     except Refused as error:
-        raise BadInput(Fault("homogenize", argument, repr(text), str(error), True)) from error
+        raise BadInput(Fault("", argument, repr(text), str(error), True)) from error
 
 
 def _point(text: str, argument: str) -> tuple[float, float]:
@@ -24,7 +24,7 @@ def _point(text: str, argument: str) -> tuple[float, float]:
 
     parts = text.split(",")
     if len(parts) != 2:
-        raise BadInput(Fault("homogenize", argument, repr(text), 'two lengths, such as "5 m, 5 m"', True))
+        raise BadInput(Fault("", argument, repr(text), 'two lengths, such as "5 m, 5 m"', True))
     return _length(parts[0], argument), _length(parts[1], argument)
 
 
@@ -33,7 +33,7 @@ def _corners(text: str) -> list[tuple[float, float]]:
 
     corners = [_point(p, "polygon") for p in text.split(";") if p.strip()]
     if len(corners) < 3:
-        raise BadInput(Fault("homogenize", "polygon", repr(text), "at least three corners", True))
+        raise BadInput(Fault("", "polygon", repr(text), "at least three corners", True))
     return corners
 
 

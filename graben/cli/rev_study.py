@@ -57,7 +57,7 @@ def main(
     if grid is not None:
         short.append(f"samples.grid={grid}")
     if calibrate is not None:
-        short.append(f"calibration.scene={json.dumps(str(calibrate.resolve()))}")
+        short.append(f"calibration.scene={json.dumps(str(calibrate.absolute()))}")
     if processes is not None:
         short.append(f"processes={processes}")
     study = load_scene(scene, "rev-study", short) if scene else default_scene("rev-study", short)

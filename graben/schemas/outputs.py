@@ -22,6 +22,7 @@ FOLDER, PVD, MATERIAL = ".vtu", ".pvd", ".material.toml"
 CHECKPOINT, STATE, PARTIAL, LAST_GOOD = ".checkpoint.npz", ".state.npz", ".partial.nc", ".last-good"
 
 SERIES = (FOLDER, PVD)
+PICTURES = (".png", ".pdf", ".svg")
 
 _ROOM = 100_000  # bytes that must be free before a run starts
 _RESERVED = (".partial", LAST_GOOD)
@@ -46,7 +47,7 @@ class Outputs:
     main : the artifact, picture or page; it is put in place last
     ends : of the names of what is written beside it
     kept : the same, of what a run that is stopped or fails leaves behind
-    others : further files, named by the user
+    others : pictures, named by the user
     """
 
     main: Path
@@ -107,6 +108,9 @@ class Outputs:
                 earlier = [p for p in paths[:k] if _same(path, p) or _within(path, p) or _within(p, path)]
                 if earlier:
                     yield Fault(str(path), "", "", f"another name than that of the output {earlier[0]}")
+        for path in self.others:
+            if path.suffix not in PICTURES:
+                yield Fault(str(path), "", "", "a picture name ending in " + ", ".join(PICTURES))
         if self.kept and unfit(self.main):
             yield Fault(str(self.main), "", "", unfit(self.main))
         if name_of(self.main).endswith(_RESERVED) and self.main.suffix == ".nc":
@@ -206,13 +210,18 @@ def _same(a: Path, b: Path) -> bool:
     with suppress(OSError):
         if a.samefile(b):
             return True
-    a, b = a.resolve(), b.resolve()
+    a, b = _real(a), _real(b)
     return a == b or (a.parent == b.parent and a.name.casefold() == b.name.casefold() and not a.exists())
+
+
+def _real(path: Path) -> Path:
+    """Without links; a loop of them stays as it is."""
+    return Path(os.path.realpath(path))
 
 
 def _within(path: Path, folder: Path) -> bool:
     """Whether `path` lies in the folder of VTU files that will be at `folder`."""
-    return folder.suffix == FOLDER and folder.resolve() in path.resolve().parents
+    return folder.suffix == FOLDER and _real(folder) in _real(path).parents
 
 
 def _what(mode: int) -> str:

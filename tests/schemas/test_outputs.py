@@ -84,6 +84,11 @@ def test_a_folder_with_files_of_the_user_is_refused(content, tmp_path):
     assert "k.vtu" in refused(Outputs(artifact, SERIES), overwrite=True)
 
 
+@pytest.mark.parametrize("name", ["a.jpg", "a.txt", "a", ".png", "a.png.gz", "a.PNG"])
+def test_pictures_of_other_forms_are_refused_before_work_begins(name, tmp_path):
+    assert ".png, .pdf, .svg" in refused(Outputs(tmp_path / "a.nc", others=(tmp_path / name,)))
+
+
 @pytest.mark.parametrize("end", ["png", "pdf", "svg"])
 def test_pictures_of_the_users_own_are_refused(end, tmp_path):
     from matplotlib.figure import Figure
@@ -146,6 +151,10 @@ class TestInputs:
         os.link(source, tmp_path / "hard.nc")
         assert "input" in refused(Outputs(output), source, overwrite=True)
 
+    def test_links_in_a_loop_are_no_input(self, tmp_path):
+        (tmp_path / "loop").symlink_to("loop")
+        Outputs(tmp_path / "a.nc", SERIES).claim([tmp_path / "loop", tmp_path / "loop/b.csv"])  # reading it says so
+
     def test_nor_does_one_lie_in_a_folder_that_is_replaced(self, tmp_path):
         fields(tmp_path / "a.nc")
         assert "input" in refused(Outputs(tmp_path / "a.nc", SERIES), tmp_path / "a.vtu/0000.vtu", overwrite=True)
@@ -204,7 +213,7 @@ def test_the_fields_of_another_run_are_no_folder_for_outputs(tmp_path):
     fields(tmp_path / "a.nc")
     for name in ("z.nc", "0007.vtu", "sub/z.nc"):
         assert "fields of a run" in refused(Outputs(tmp_path / "a.vtu" / name))
-        assert "fields of a run" in refused(Outputs(tmp_path / "z.nc", others=(tmp_path / "a.vtu" / name,)))
+        assert "fields of a run" in refused(Outputs(tmp_path / "z.nc", others=(tmp_path / "a.vtu" / "z.png",)))
     (tmp_path / "user.vtu").mkdir()
     Outputs(tmp_path / "user.vtu/z.nc").claim([])
 

@@ -137,7 +137,7 @@ def curves_of(
     if "particles" in kinds:
         return _spheres(inputs, kinds, radii, centre, deformed, chosen_at, drawn, progress)
     if centre is not None and len(centre) != 2:
-        raise BadInput(Fault("homogenize", "centre", f"{len(centre)} lengths", "x, y for blocks", True))
+        raise BadInput(Fault("", "centre", f"{len(centre)} lengths", "x, y for blocks", True))
     jobs, faults = _jobs(inputs, radii, centre, polygon, chosen_at, progress)
     if faults:
         raise BadInput(faults)
@@ -168,7 +168,7 @@ def curves_of(
 
 def _either(radii: Sequence[float], polygon: Sequence[Point]) -> None:
     if bool(radii) == bool(polygon):
-        raise BadInput(Fault("homogenize", "radius", "", "either a `radius` or a `polygon`", True))
+        raise BadInput(Fault("", "radius", "", "either a `radius` or a `polygon`", True))
 
 
 def _measures(cost: dict[str, Any]) -> list[Measure]:
@@ -199,13 +199,13 @@ def _spheres(
         if kind != "particles"
     ]
     if not radii:
-        faults.append(Fault("homogenize", "polygon", "", "a `radius`: spheres are averaged over balls", True))
+        faults.append(Fault("", "polygon", "", "a `radius`: spheres are averaged over balls", True))
     if deformed or drawn:
         name = "deformed" if deformed else drawn
         expected = "blocks: spheres have no outline, and a ball goes with them"
-        faults.append(Fault("homogenize", name, "", expected, True))
+        faults.append(Fault("", name, "", expected, True))
     if centre is not None and len(centre) != 3:
-        faults.append(Fault("homogenize", "centre", f"{len(centre)} lengths", "x, y, z for spheres", True))
+        faults.append(Fault("", "centre", f"{len(centre)} lengths", "x, y, z for spheres", True))
     if faults:
         raise BadInput(faults)
     return Curves(
@@ -248,7 +248,7 @@ def _jobs(
             if polygon:
                 revs.append(Polygon(tuple(polygon)))
         except Refused as error:
-            return [], [Fault("homogenize", "radius" if radii else "polygon", "", str(error), True)]
+            return [], [Fault("", "radius" if radii else "polygon", "", str(error), True)]
         for rev in revs:
             faults += source.refuse_outside(rev, "radius" if radii else "polygon", chosen_at, argument=True)
             jobs.append((source, rev))

@@ -11,9 +11,8 @@ from graben.schemas.artifact import PARTIAL, read_artifact
 from graben.schemas.artifact_marks import DIGEST
 from graben.schemas.files import whole_file
 from graben.schemas.kinds import LAYOUTS, layout
-from graben.schemas.outputs import Outputs, picture_mark
+from graben.schemas.outputs import PICTURES, Outputs, picture_mark
 
-FORMATS = (".png", ".pdf", ".svg")
 _DPI = 130
 
 
@@ -22,10 +21,10 @@ def run(artifact: Path, output: Path, *, overwrite: bool = False) -> None:
 
     Raises
     ------
-    BadInput : the artifact has faults, the picture exists, or its format is not one of FORMATS
+    BadInput : the artifact has faults, the picture exists, or its format is not one of PICTURES
     """
-    if output.suffix not in FORMATS:
-        raise BadInput(Fault(str(output), "", "", "a picture name ending in " + ", ".join(FORMATS)))
+    if output.suffix not in PICTURES:
+        raise BadInput(Fault(str(output), "", "", "a picture name ending in " + ", ".join(PICTURES)))
     Outputs(output, kept=()).claim([artifact], overwrite=overwrite)
     picture = drawn(artifact, output.suffix)
     with whole_file(output, ends_run=True) as temporary:
@@ -33,7 +32,7 @@ def run(artifact: Path, output: Path, *, overwrite: bool = False) -> None:
 
 
 def drawn(artifact: Path, form: str) -> bytes:
-    """The picture of an artifact, as a file of one of FORMATS.
+    """The picture of an artifact, as a file of one of PICTURES.
 
     Raises
     ------
