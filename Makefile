@@ -9,7 +9,7 @@ BIN    := $(VENV)/bin
 READY  := $(VENV)/.ready
 RESULTS ?= results
 FIDELITY ?= standard
-# The order of the tests, another each time so that none leans on another.
+# The order of the tests and the tries of the fuzz: others each time.
 SEED   := $(or $(SEED),$(shell date +%s))
 # Runs that do not wait for one another go side by side.
 TRIES  ?= 20000
@@ -51,8 +51,8 @@ matrix: $(READY) ## the tests in other orders, threads, Pythons, versions, besid
 	$(BIN)/python tests/matrix.py $(ROWS)
 
 .PHONY: fuzz
-fuzz: $(READY) ## damaged inputs of every kind are read or refused (at most TRIES tries and SECONDS seconds)
-	$(BIN)/python -m tests.fuzz --tries $(TRIES) --seconds $(SECONDS)
+fuzz: $(READY) ## damaged inputs are read or refused (at most TRIES tries, SECONDS seconds); again: SEED=N
+	$(BIN)/python -m tests.fuzz --tries $(TRIES) --seconds $(SECONDS) --seed $(SEED)
 
 .PHONY: verify
 verify: $(READY) ## the long verification against closed forms

@@ -21,7 +21,7 @@ def scenes(rng: random.Random, stock: Path, folder: Path) -> None:
     scene.write_text(damaged_text(rng, source.read_text(encoding="utf-8")), encoding="utf-8")
     kind = source.name.split(".")[0]
     # A stage takes a hundred times longer than the check: few of those that are sound are started.
-    run_scene(scene, kind, [stock / "artifacts/blocks.nc"], sound=rng.random() < 0.2)
+    run_scene(scene, kind, [stock / "artifacts/blocks.nc"], sound=rng.random() < 0.5)
 
 
 def artifacts(rng: random.Random, stock: Path, folder: Path) -> None:
