@@ -114,9 +114,11 @@ def existing_folder(path: Path) -> Path:
 
 
 def unfit(path: Path) -> str:
-    """What a path should be where libraries could not open it; empty where they can."""
+    """What a path should be where libraries could not open or name it; empty where they can."""
     if os.sep != "\\" and "\\" in str(path.absolute()):
         return "a path without backslashes, which NetCDF takes for slashes"
+    if re.search("[\\x00-\\x1f\\x7f]", path.name):
+        return "a name without control characters, which no XML holds"
     try:
         str(path.absolute()).encode()
     except UnicodeEncodeError:

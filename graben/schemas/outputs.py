@@ -257,7 +257,8 @@ def _pvd(path: Path, main: Path) -> bool:
 
 def owner_mark(output: Path) -> str:
     """A comment by which a PVD names the artifact that it belongs to."""
-    return f"<!-- graben: fields of {output.name.replace('--', '- -')} -->"
+    name = re.sub("-(?=-)", "- ", output.name)  # XML ends comments by two of them
+    return f"<!-- graben: fields of {name} -->"
 
 
 def picture_mark(form: str) -> dict[str, str]:

@@ -33,6 +33,19 @@ def test_a_series_puts_states_on_a_time_axis(tmp_path):
     assert reader.read()[0].cell_data["t"][0] == 0.5
 
 
+@pytest.mark.parametrize("name", ["a---b", "--", "-", "a&<b>\"'c", "ü ✓", "a.b", "%41"])
+def test_series_of_odd_names_open_and_are_known_again(name, tmp_path):
+    import pyvista
+
+    from graben.schemas.outputs import SERIES, Outputs
+
+    artifact = tmp_path / f"{name}.nc"
+    with vtu_series(artifact) as series:
+        series.add(0.0, SQUARE, {"quad": np.array([[0, 1, 2, 3]])})
+    assert pyvista.get_reader(tmp_path / f"{name}.pvd").read()[0].n_cells == 1
+    Outputs(artifact, SERIES).claim([], overwrite=True)
+
+
 def test_a_discarded_series_leaves_nothing(tmp_path):
     with pytest.raises(ZeroDivisionError), vtu_series(tmp_path / "run.nc") as series:
         series.add(0.0, SQUARE, {"quad": np.array([[0, 1, 2, 3]])})
