@@ -4,6 +4,7 @@ import errno
 import json
 import subprocess
 import sys
+from concurrent.futures.process import BrokenProcessPool
 
 import click
 import pytest
@@ -52,6 +53,7 @@ TWO_FAULTS = BadInput([Fault("a.toml", "seed", "-1", "0 or more"), Fault("a.toml
         (ImportError("libx.so: failed to map segment from shared object"), 3, ["not enough memory", "libx.so"]),
         (RuntimeError("can't start new thread"), 3, ["not enough memory"]),
         (ImportError("no module x"), 1, ["a fault of the program"]),
+        (BrokenProcessPool("a process was terminated abruptly"), 3, ["a worker was ended", "memory"]),
         (KeyboardInterrupt(), 130, ["interrupted"]),
         (ZeroDivisionError("1/0"), 1, ["a fault of the program", "--debug"]),
     ],

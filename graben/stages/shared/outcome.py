@@ -15,6 +15,7 @@ _MACHINE = {
     errno.ESTALE, errno.EAGAIN,
 }  # fmt: skip
 # What the loader of libraries and the interpreter say of the same.
+_LOST = {"BrokenExecutor", "KilledWorker"}  # of pools of processes, and of Dask, which may not be installed
 _NO_MEMORY = re.compile(r"failed to map segment|[Cc]annot allocate memory|can't start new thread")
 
 
@@ -43,6 +44,8 @@ def explain(error: BaseException) -> tuple[int, list[str]] | None:
         type(error) in (ImportError, RuntimeError) and _NO_MEMORY.search(str(error))
     ):
         return FAILED, [f"not enough memory: {error}".rstrip(": ")]
+    if _LOST & {kind.__name__ for kind in type(error).__mro__}:
+        return FAILED, ["a worker was ended from outside, as when memory runs out; take fewer, or smaller ones"]
     if isinstance(error, OSError) and error.errno in _MACHINE:
         return FAILED, [f"the machine failed: {error}"]
     if isinstance(error, KeyboardInterrupt):
