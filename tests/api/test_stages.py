@@ -128,7 +128,7 @@ def test_homogenize_takes_numbers_and_text_and_several_of_each(small_blocks, sma
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ({"radius": 1.0, "centre": (1.0, 1.0, 1.0)}, "homogenize: centre = 3 lengths: expected x, y for blocks"),
+        ({"radius": 1.0, "centre": (1.0, 1.0, 1.0)}, "centre = 3 lengths: expected x, y for blocks"),
         ({}, "radius: expected either a `radius` or a `polygon`"),
         ({"radius": "1 kg"}, "radius = '1 kg': expected a number in m"),
         ({"radius": 1.0, "chosen_at": 99}, "chosen_at = 99: expected a saved state"),

@@ -14,8 +14,8 @@ _MACHINE = {
     errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM,
     errno.ESTALE, errno.EAGAIN,
 }  # fmt: skip
-# What the loader of libraries and the interpreter say of the same.
 _LOST = {"BrokenExecutor", "KilledWorker"}  # of pools of processes, and of Dask, which may not be installed
+# What the loader of libraries and the interpreter say of the same.
 _NO_MEMORY = re.compile(r"failed to map segment|[Cc]annot allocate memory|can't start new thread")
 
 
