@@ -102,6 +102,7 @@ def _run(name: str, row: Row) -> dict[str, object]:
         *row.options,
     ]
     log = HOME / f"{name}.log"
+    log.parent.mkdir(exist_ok=True)
     busy = [subprocess.Popen([python, "-c", "while True: pass"]) for _ in range(row.load)]
     begun = time.monotonic()
     try:
