@@ -34,6 +34,18 @@ def fail(value):
     raise NumericsFailed("a pivot vanished", where=f"element {value}", step=3, advice="smaller steps")
 
 
+def _started(distributed, tries=5):
+    """A cluster; its library gives a thread ten seconds to start, and a machine that stands still takes longer."""
+    try:
+        return distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", memory_limit=0
+        )
+    except AssertionError:
+        if tries == 1:
+            raise
+        return _started(distributed, tries - 1)
+
+
 @pytest.fixture(scope="module")
 def cluster():
     """Two real worker processes."""
@@ -42,9 +54,7 @@ def cluster():
 
     # They cannot import the tests, so the functions of this module travel whole.
     cloudpickle.register_pickle_by_value(sys.modules[__name__])
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", memory_limit=0
-    ) as local:
+    with _started(distributed) as local:
         yield local.scheduler_address
     cloudpickle.unregister_pickle_by_value(sys.modules[__name__])
 
