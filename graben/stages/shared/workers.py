@@ -156,9 +156,21 @@ def connect(address: str, patience_s: float) -> Client:
     except ModuleNotFoundError as error:
         expected = "Dask on this machine: pip install 'graben[cluster]'"
         raise BadInput(Fault("", "cluster", address, f"{expected} ({error})", True)) from None
+
+    class ClosedAtFailure(Client):
+        """One that did not connect would close itself when memory is cleaned up: at the start of another one this
+        waits for itself, for ever."""
+
+        def start(self, **arguments: Any) -> None:
+            try:
+                super().start(**arguments)
+            except BaseException:
+                self.close()
+                raise
+
     try:
         # As a default, Dask would send every computation of this process there, and go on when the client is gone.
-        return Client(address, timeout=patience_s, set_as_default=False)
+        return ClosedAtFailure(address, timeout=patience_s, set_as_default=False)
     except (OSError, ValueError) as error:
         expected = f'the address of a Dask scheduler, such as "tcp://10.0.0.1:8786" ({error})'
         raise BadInput(Fault("", "cluster", address, expected, True)) from None

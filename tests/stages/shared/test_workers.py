@@ -114,9 +114,15 @@ def test_a_killed_worker_of_a_cluster_loses_nothing(cluster, tmp_path):
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nowhere://x", "127.0.0.1"])
-def test_no_cluster_is_a_fault_of_the_option(address, unspoiled_dask):
+def test_no_cluster_is_a_fault_of_the_option(address, unspoiled_dask, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    clients = []
+    start = distributed.Client.start
+    monkeypatch.setattr(distributed.Client, "start", lambda self, **kw: (clients.append(self), start(self, **kw)))
     with pytest.raises(BadInput, match=r"^cluster"):
         compute(slow_square, TASKS, cluster=address, patience_s=1.0)
+    # What is left open closes itself at any later moment, and may then wait for itself.
+    assert [client.status for client in clients] == ["closed"]
 
 
 def test_a_cluster_leaves_no_scheduler_behind(cluster, unspoiled_dask):
