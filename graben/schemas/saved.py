@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 import logging
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,10 @@ def write_saved(path: Path, owner: Mapping[str, str], arrays: Mapping[str, Any])
             # By way of memory: the archive of a file that is too large complains on stderr when it is forgotten.
             archive = io.BytesIO()
             np.savez(archive, **stored, **{_DIGEST: np.array(_digest(stored))})  # type: ignore[arg-type]
-            temporary.write_bytes(archive.getbuffer())
+            archive.seek(0)
+            # By copy: an error would hold a view of that memory, and Python 3.12.1 crashes where it lets go of one.
+            with temporary.open("wb") as file:
+                shutil.copyfileobj(archive, file)
     except MachineFailed as error:
         logging.getLogger(__name__).warning("no state is kept: %s", error)
         return False
