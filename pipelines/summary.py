@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from graben.declared.laws import PARAMETERS
 from graben.schemas.plain import write_json
-from graben.schemas.scenes.material import UNITS
 
 UDEC = Path(__file__).parent / "upscaling/reference/udec_voronoi_granite_fit.csv"
 
@@ -134,7 +134,7 @@ def rows_of(chain: str, stages: dict[str, Any]) -> list[tuple[str, str, str]]:
              for row in (UPSCALING if chain == "upscaling" else WEAR)]  # fmt: skip
     if chain == "upscaling":
         fit = stages["calibration"]
-        units = UNITS[fit["law"]]
+        units = {p.name: p.unit for p in PARAMETERS[fit["law"]]}
         law = [(f"law of our blocks: {name.replace('_', ' ')}", shown(value, units[name]), "")
                for name, value in fit["parameters"].items()]  # fmt: skip
         return [*peaks(stages), *plain[:1], *law, *plain[1:]]

@@ -31,10 +31,10 @@ SMALL_BED = ["fidelity=draft", 'box.width="0.6 mm"', 'box.depth="0.3 mm"']
 @pytest.fixture
 def laws_as_before():
     """Laws from outside that a test makes known are forgotten after it."""
+    from graben.declared.laws import PARAMETERS
     from graben.mechanics.materials.laws import LAWS
-    from graben.schemas.scenes.material import UNITS
 
-    former = [(known, dict(known)) for known in (LAWS, UNITS)]
+    former = [(known, dict(known)) for known in (LAWS, PARAMETERS)]
     yield
     for known, before in former:
         known.clear()

@@ -10,14 +10,15 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graben.declared.laws import parameter
+from graben.declared.parameter import Parameter
 from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.materials import point
 from graben.mechanics.materials.foreign import make_law
-from graben.mechanics.materials.law import Law, Parameter
+from graben.mechanics.materials.law import Law
 from graben.mechanics.materials.laws import LAWS, register
+from graben.schemas.quantities import KNOWN
 from graben.schemas.scenes.material import (
-    UNITS,
-    declare,
     material_table,
     parameter_to_si,
     read_material,
@@ -91,11 +92,12 @@ def material(law: str | Path, **parameters: Any) -> Material:
 
 def _in_si(law: str, name: str, value: Any) -> Any:
     """Text with its unit -> a number; numbers and words as they are; tables row by row."""
-    unit = UNITS.get(law, {}).get(name, "word")
+    p = parameter(law, name)
+    word = p is None or p.form == "word"
     if isinstance(value, str):
-        return value if unit == "word" else parameter_to_si(law, name, value)
+        return value if word else parameter_to_si(law, name, value)
     if np.ndim(value) == 0:
-        return float(value) if unit != "word" else value
+        return value if word else float(value)
     rows = value.tolist() if hasattr(value, "tolist") else value
     return [[float(x), parameter_to_si(law, "young_modulus", y) if isinstance(y, str) else float(y)] for x, y in rows]
 
@@ -262,9 +264,10 @@ def law(
         initial = dict(state) if isinstance(state, Mapping) else dict.fromkeys(state, 0.0)
         words = title or (getattr(function, "__doc__", None) or name).strip().splitlines()[0]
         try:
-            record = make_law(name, function, tuple(parameters), initial, isotropic, words)
-            declare(name, {p.name: p.unit for p in parameters})
-            register(record)
+            for p in parameters:
+                if p.unit not in ("1", *KNOWN):
+                    raise Refused(f"{p.name} in one of the units 1, {', '.join(KNOWN)}, not {p.unit!r}")
+            register(make_law(name, function, tuple(parameters), initial, isotropic, words))
         except Refused as error:
             raise BadInput(Fault("law", name, "", str(error), True)) from error
         return function

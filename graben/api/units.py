@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from graben.declared import laws
 from graben.errors import BadInput, Fault, Refused
 from graben.schemas.kinds import scene_model
 from graben.schemas.quantities import to_si
-from graben.schemas.scenes.material import UNITS
 
 
 def si(value: float | str, unit: str, argument: str) -> float:
@@ -49,11 +49,11 @@ def _with_units(schema: dict[str, Any], value: Any, defs: dict[str, Any]) -> Any
 
 def parameter(law: str, name: str, value: Any) -> Any:
     """A law's parameter as scenes take it: numbers get their unit, tables row by row."""
-    unit = UNITS.get(law, {}).get(name, "word")
+    p = laws.parameter(law, name)
     if hasattr(value, "tolist"):
         value = value.tolist()
-    if isinstance(value, int | float) and unit not in ("word", "table", "1"):
-        return f"{float(value)!r} {unit}"
+    if isinstance(value, int | float) and p is not None and p.form == "number" and p.unit != "1":
+        return f"{float(value)!r} {p.unit}"
     if isinstance(value, list | tuple):
         return [[x, y if isinstance(y, str) else f"{float(y)!r} Pa"] for x, y in value]
     return value

@@ -3,19 +3,19 @@
 import pytest
 
 import graben
+from graben.declared.laws import PARAMETERS
 from graben.mechanics.materials.laws import LAWS
-from graben.schemas.scenes.material import UNITS
 from tests.api.laws import VOCE, voce
 
 
 @pytest.fixture(scope="session")
 def voce_law():
-    """The record of "voce test" and its units: compiled once."""
+    """The record of "voce test" and its parameters: compiled once."""
     graben.law("voce test", VOCE, ["equivalent_plastic_strain"])(voce)
-    return LAWS.pop("voce test"), UNITS.pop("voce test")
+    return LAWS.pop("voce test"), PARAMETERS.pop("voce test")
 
 
 @pytest.fixture
 def foreign_laws(voce_law, laws_as_before):
     """The law "voce test" is known, and what a test defines is forgotten after it."""
-    LAWS["voce test"], UNITS["voce test"] = voce_law
+    LAWS["voce test"], PARAMETERS["voce test"] = voce_law

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import graben
+from graben.declared.laws import PARAMETERS
 from graben.mechanics.fitting.curves import Curve, CurveFit
 from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE
 from graben.mechanics.materials.laws import LAWS, update
-from graben.schemas.scenes.material import UNITS
 from tests.api.laws import STEEL, VOCE, voce
 
 STRAIN = np.linspace(0.0, -0.04, 41)
@@ -197,7 +197,7 @@ def test_definitions_that_make_no_law_are_refused():
     ):
         with pytest.raises(graben.BadInput, match=said):
             graben.law(name, parameters)(function)
-        assert "test" not in LAWS and "test" not in UNITS
+        assert "test" not in LAWS and "test" not in PARAMETERS
     with pytest.raises(graben.BadInput, match=r"from 0 to 1"):
         graben.law("test", [parameter])(good)
         graben.material("test", x=2.0)

@@ -30,11 +30,15 @@ agree when psi = beta.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
+from graben.declared.laws import PARAMETERS
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.drucker_prager_parameters import (
+from graben.mechanics.materials.drucker_prager_return import ROOT32, apex_flow, bisect, newton, yield_stress
+from graben.mechanics.materials.drucker_prager_slots import (
     BETA,
     D3,
     DAMAGE,
@@ -48,7 +52,6 @@ from graben.mechanics.materials.drucker_prager_parameters import (
     KIND,
     LOG_D2,
     NU,
-    PARAMETERS,
     PEAK,
     PSI,
     RATE,
@@ -59,9 +62,7 @@ from graben.mechanics.materials.drucker_prager_parameters import (
     UF,
     E,
     K,
-    check,
 )
-from graben.mechanics.materials.drucker_prager_return import ROOT32, apex_flow, bisect, newton, yield_stress
 from graben.mechanics.materials.elastic import add_elastic, fill_elastic, finite, moduli
 from graben.mechanics.materials.hardening import BARCELONA, EXPONENTIAL, barcelona_coefficients
 from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law
@@ -290,14 +291,25 @@ def _shears(e1, e2, e3, s1, s2, s3, scale, keep, shear, tangent):
     return g12, g13, g23
 
 
+def _check(values: Mapping[str, Any]) -> list[str]:
+    found = []
+    if values["dilation_angle"] > values["friction_angle"]:
+        found.append("dilation_angle at most friction_angle, otherwise flow under pressure yields work")
+    if values["hardening"] == "barcelona" and values["peak_yield"] < values["initial_yield"]:
+        found.append("peak_yield at least initial_yield")
+    if values["hardening"] == "table" and np.any(np.asarray(values["hardening_table"])[:, 1] < 0.0):
+        found.append("hardening_table without negative stresses")
+    return found
+
+
 DRUCKER_PRAGER = Law(
     id=3,
     name="drucker-prager",
     title="extended Drucker-Prager with ductile damage",
-    parameters=PARAMETERS,
+    parameters=PARAMETERS["drucker-prager"],
     derived=("tan_friction", "tan_dilation", "hardening_a", "hardening_b", "log_d2", "d3"),
     state_names=("equivalent_plastic_strain", "damage", "initiation"),
     initial_state=lambda par: np.zeros(3),
     prepare=prepare_drucker_prager,
-    check=check,
+    check=_check,
 )

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.drucker_prager_parameters import (
+from graben.mechanics.materials.drucker_prager_slots import (
     HARD_A,
     HARD_B,
     KIND,

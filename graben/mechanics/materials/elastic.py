@@ -4,14 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from graben.declared.laws import PARAMETERS
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.law import NOT_FINITE, OK, Law, Parameter
-
-YOUNG = Parameter(
-    "young_modulus", "Pa", 1e-3, 1e16, None, "Young's modulus", usual="1 to 100 GPa for rock, less when jointed"
-)
-# nu = 0.5 has no bulk modulus; negative values are computed but say so little about rock that they need intent
-POISSON = Parameter("poisson_ratio", "1", -0.99, 0.49999, None, "Poisson's ratio", usual="0.1 to 0.4")
+from graben.mechanics.materials.law import NOT_FINITE, OK, Law
 
 
 @kernel(error_model="numpy")
@@ -71,7 +66,7 @@ ELASTIC = Law(
     id=0,
     name="elastic",
     title="linear isotropic elasticity",
-    parameters=(YOUNG, POISSON),
+    parameters=PARAMETERS["elastic"],
     state_names=("equivalent_plastic_strain", "damage"),
     initial_state=lambda par: np.zeros(2),
 )

@@ -27,11 +27,12 @@ import math
 
 import numpy as np
 
+from graben.declared.laws import PARAMETERS
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.elastic import POISSON, YOUNG, add_elastic, finite, moduli
+from graben.mechanics.materials.elastic import add_elastic, finite, moduli
 from graben.mechanics.materials.j2 import fill_tangent
-from graben.mechanics.materials.j2_hardening import FORMS, hardening_faults, return_to_strength
-from graben.mechanics.materials.law import NOT_FINITE, OK, Law, Parameter
+from graben.mechanics.materials.j2_hardening import hardening_faults, return_to_strength
+from graben.mechanics.materials.law import NOT_FINITE, OK, Law
 from graben.mechanics.tensors.principal import (
     back_plane_stress,
     back_space_stress,
@@ -139,28 +140,7 @@ ENERGY_DAMAGE = Law(
     id=7,
     name="energy-damage",
     title="J2 plasticity with damage by an energy threshold, f = exp(-d)",
-    parameters=(
-        YOUNG,
-        POISSON,
-        Parameter(
-            "damage_threshold",
-            "Pa",
-            0.0,
-            1e15,
-            None,
-            "r_d: damage starts where the driving energy density exceeds it",
-            "0.01 to 10 MPa",
-        ),
-        Parameter(
-            "split",
-            "1",
-            default="tension",
-            choices=("none", "tension"),
-            description="what drives damage: all elastic energy, or that of the positive principal strains",
-        ),
-        Parameter("max_damage", "1", 0.0, 0.9999, 0.999, "a stiffness remains", "0.9 to 0.999"),
-        *FORMS,
-    ),
+    parameters=PARAMETERS["energy-damage"],
     state_names=("equivalent_plastic_strain", "damage"),
     initial_state=lambda par: np.zeros(2),
     check=hardening_faults,

@@ -28,11 +28,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from graben.declared.laws import PARAMETERS
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.elastic import POISSON, YOUNG, finite
+from graben.mechanics.materials.elastic import finite
 from graben.mechanics.materials.j2 import fill_tangent
-from graben.mechanics.materials.j2_hardening import HARDENING, hardening_faults, return_to_table
-from graben.mechanics.materials.law import NOT_FINITE, OK, Law, Parameter
+from graben.mechanics.materials.j2_hardening import hardening_faults, return_to_table
+from graben.mechanics.materials.law import NOT_FINITE, OK, Law
 from graben.mechanics.tensors.principal import back_space_stress, split_space
 
 MAX_STEP = 4
@@ -165,37 +166,7 @@ ERVE = Law(
     id=5,
     name="erve",
     title="J2 plasticity with relaxed, rate-limited damage (emulated representative volume element)",
-    parameters=(
-        YOUNG,
-        POISSON,
-        Parameter(
-            "damage_threshold",
-            "Pa",
-            0.0,
-            1e12,
-            None,
-            "r_d of H (6.83): damage starts where twice the driving energy density exceeds it",
-            usual="H prints 0.1 MPa, which starts damage at 145 MPa uniaxial in steel, far below yield",
-        ),
-        Parameter("subdomains", "1", 1, 1000, 20, "number n of subdomains of equal volume"),
-        Parameter(
-            "max_damage_step",
-            "1",
-            0.0,
-            1.0,
-            0.001,
-            "largest growth of a subdomain's damage in one increment; a stage that limits damage by external "
-            "work, H (6.98), writes it before each increment",
-        ),
-        Parameter(
-            "split",
-            "1",
-            default="none",
-            choices=("none", "volumetric", "positive-principal"),
-            description="part of the elastic energy that drives damage, and of the stress that it takes away",
-        ),
-        HARDENING,
-    ),
+    parameters=PARAMETERS["erve"],
     state_names=("equivalent_plastic_strain", "damage"),
     initial_state=lambda par: np.zeros(8 + int(par[3])),
     check=hardening_faults,

@@ -23,9 +23,10 @@ from numba.extending import intrinsic
 from numba.np import arrayobj
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
+from graben.declared.parameter import Parameter
 from graben.errors import Refused
 from graben.mechanics.compiled import c_kernel
-from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law, Parameter
+from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law
 
 FIRST = 1 << 8
 """Ids of this size and more, either sign, are such places."""
@@ -165,7 +166,7 @@ def make_law(
     if not parameters:
         raise Refused("at least one parameter")
     for p in parameters:
-        if p.choices or p.table or p.when or not p.name.isidentifier():
+        if p.form != "number" or p.when or not p.name.isidentifier():
             raise Refused(f"parameters that are numbers with names as in Python, not {p.name!r}")
     plain = getattr(function, "py_func", function)
     count = len(inspect.signature(plain).parameters)

@@ -9,8 +9,7 @@ import math
 
 from graben.mechanics.compiled import kernel
 
-EXPONENTIAL, BARCELONA, LINEAR, TABLE = 0, 1, 2, 3
-CHOICES = ("exponential", "barcelona", "linear", "table")
+EXPONENTIAL, BARCELONA, LINEAR, TABLE = 0, 1, 2, 3  # the order of the declared choices
 
 
 @kernel(error_model="numpy")

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from graben.declared.laws import PARAMETERS
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.elastic import POISSON, YOUNG, finite
-from graben.mechanics.materials.j2_hardening import FORMS, hardening_faults, return_to_strength
+from graben.mechanics.materials.elastic import finite
+from graben.mechanics.materials.j2_hardening import hardening_faults, return_to_strength
 from graben.mechanics.materials.law import NOT_FINITE, OK, Law
 
 STRENGTH = 2  # where the slots of the hardening start in par
@@ -79,7 +80,7 @@ J2 = Law(
     id=1,
     name="j2",
     title="von Mises plasticity with isotropic hardening",
-    parameters=(YOUNG, POISSON, *FORMS),
+    parameters=PARAMETERS["j2"],
     state_names=("equivalent_plastic_strain",),
     initial_state=lambda par: np.zeros(1),
     check=hardening_faults,

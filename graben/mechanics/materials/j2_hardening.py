@@ -20,10 +20,8 @@ from typing import Any
 import numpy as np
 
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.law import Parameter
 
-TABLE, LINEAR, EXPONENTIAL = 0, 1, 2
-CHOICES = ("table", "linear", "exponential")
+TABLE, LINEAR, EXPONENTIAL = 0, 1, 2  # the order of the declared choices
 SLOTS = 5  # before the table
 
 
@@ -114,29 +112,3 @@ def hardening_faults(values: Mapping[str, Any]) -> list[str]:
     if np.any(np.diff(rows[:, 1]) < 0.0):
         found.append("hardening: yield stresses must not fall (softening belongs to damage)")
     return found
-
-
-_ROWS = "table of (equivalent plastic strain, yield stress in Pa), linear between, constant beyond"
-
-HARDENING = Parameter("hardening", "Pa", description=_ROWS, table=True)
-"""The table alone, as `erve` takes it."""
-
-# a strength of zero would leave the direction of flow without meaning
-FORMS = (
-    Parameter("hardening", "1", default="table", choices=CHOICES, description="form of the hardening curve"),
-    Parameter(
-        "initial_yield",
-        "Pa",
-        1e-9,
-        1e15,
-        None,
-        "s0, yield stress of the virgin material",
-        "50 to 1000 MPa",
-        when=("hardening", "linear|exponential"),
-    ),
-    Parameter("hardening_modulus", "Pa", 0.0, 1e15, None, "H, slope", "0 to 0.05 E", when=("hardening", "linear")),
-    Parameter("hardening_gain", "Pa", 0.0, 1e15, None, "Q", "0 to 2 s0", when=("hardening", "exponential")),
-    Parameter("hardening_rate", "1", 0.0, 1e9, None, "b", "1 to 100", when=("hardening", "exponential")),
-    Parameter("hardening_table", "Pa", description=_ROWS, table=True, when=("hardening", "table")),
-)
-"""The choice of form and what belongs to each; they fill the slots in the order that `return_to_strength` reads."""

@@ -1,4 +1,4 @@
-"""What a constitutive law declares about itself: parameters, bounds, units, state; and how values become `par`.
+"""A constitutive law as a record: its declared parameters, its state, and how values become `par`.
 
 A law is one compiled function (see `laws.py`) plus one `Law` record. `Law.pack` turns named values in SI units
 into the flat float64 array that the compiled function reads:
@@ -10,7 +10,6 @@ into the flat float64 array that the compiled function reads:
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,35 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.declared.parameter import Parameter
 from graben.errors import Refused
 
 OK = 0
 NOT_CONVERGED = 1  # the return mapping found no root
 NOT_FINITE = 2  # nan or inf came in, or a tensor too large to square
 UNKNOWN_LAW = 9
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One parameter of a law.
-
-    unit is SI ("Pa", "rad", "m", "1"); lower and upper are inclusive bounds of what the law can compute, not of
-    what is usual (`usual` says that). default None means required. `choices` makes it a word, stored as its index.
-    `when = (other, word)` says that it counts only if the choice parameter `other` is `word` (or one of
-    several, "a|b").
-    `table` makes it an (n, 2) array with rising first column.
-    """
-
-    name: str
-    unit: str
-    lower: float = -math.inf
-    upper: float = math.inf
-    default: Any = None
-    description: str = ""
-    usual: str = ""
-    choices: tuple[str, ...] = ()
-    when: tuple[str, str] | None = None
-    table: bool = False
 
 
 def _nothing(par: NDArray[np.float64]) -> None:
@@ -59,8 +36,8 @@ class Law:
 
     initial_state(par) gives the (m,) state array of the unstressed material; state[0] is the equivalent plastic
     strain and state[1] the damage where a law has them. prepare(par) fills the derived slots in place.
-    check(values) returns texts for faults that concern several parameters at once. A search asks for such values
-    too: prepare moves one of them, in place, to the nearest that check allows.
+    check(values), with defaults where nothing is given, returns texts for faults that concern several parameters at
+    once. A search asks for such values too: prepare moves one of them, in place, to the nearest that check allows.
     """
 
     id: int
@@ -135,10 +112,11 @@ class Law:
                 except (TypeError, ValueError):
                     found.append((p.name, f"a number in {p.unit}"))
                     continue
-                if not math.isfinite(number) or not p.lower <= number <= p.upper:
-                    found.append((p.name, f"a number from {p.lower:g} to {p.upper:g} {p.unit}"))
+                if not p.holds(number):
+                    found.append((p.name, f"a number {p.bounds}"))
         if not found:
-            found += [("", text) for text in self.check(values)]
+            defaults = {p.name: p.default for p in active if p.default is not None}
+            found += [("", text) for text in self.check({**defaults, **values})]
         return found
 
     def pack(self, values: Mapping[str, Any]) -> NDArray[np.float64]:

@@ -12,9 +12,9 @@ Contract of `update` and of every law's own `update_<name>(deps, sig, state, par
 - tangent (n, n) gets d sig / d deps of this very increment; with shape (0, 0) it is not computed.
 - returns 0, or a code of `law.py` above 0; then sig and state are as they were.
 
-To add a law: write `<name>.py` with `update_<name>` and a `Law` record with a free id (below), import both here, add
-the record to `_RECORDS` and a branch to `update` (and to `prepare`, if the law has derived values). State index 0 is
-the equivalent plastic strain, index 1 the damage, where they exist.
+To add a law: declare its parameters in `declared/laws.py`, write `<name>.py` with `update_<name>` and a `Law` record
+with a free id (below), import both here, add the record to `_RECORDS` and a branch to `update` (and to `prepare`, if
+the law has derived values). State index 0 is the equivalent plastic strain, index 1 the damage, where they exist.
 
 ids: 0 elastic, 1 j2, 2 mohr-coulomb, 3 drucker-prager, 4 lubliner, 5 erve, 6 transverse-elastic,
 7 energy-damage. Laws that `register` adds at run time have ids from 256 on, or below -255; see `foreign.py`.
@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.declared.laws import declare
 from graben.errors import Refused
 from graben.mechanics.compiled import kernel
 from graben.mechanics.materials.drucker_prager import (
@@ -57,8 +58,6 @@ _RECORDS: tuple[Law, ...] = (
 )
 
 LAWS: dict[str, Law] = {record.name: record for record in _RECORDS}
-
-_OURS = frozenset(LAWS)
 
 
 @kernel(error_model="numpy")
@@ -105,9 +104,11 @@ def isotropic(law_id):
 
 
 def register(record: Law) -> None:
-    """Make a law from outside known by its name in this process; one of that name from outside is replaced."""
-    if record.name in _OURS:
-        raise ValueError(f"{record.name!r} is a law of the package")
+    """Make a law from outside known by its name in this process; one of that name from outside is replaced.
+
+    Refused for the name of a law of the package.
+    """
+    declare(record.name, record.parameters)
     LAWS[record.name] = record
 
 

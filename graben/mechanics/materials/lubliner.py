@@ -35,12 +35,12 @@ from typing import Any
 
 import numpy as np
 
+from graben.declared.laws import PARAMETERS
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.elastic import POISSON, YOUNG, finite, moduli
+from graben.mechanics.materials.elastic import finite, moduli
 from graben.mechanics.materials.hardening import BARCELONA, barcelona_coefficients, harden
-from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law, Parameter
+from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law
 from graben.mechanics.materials.lubliner_curves import (
-    CRACK_STRAIN,
     compression_rate,
     cracking_strain,
     inelastic_strain,
@@ -275,7 +275,7 @@ def _check(values: Mapping[str, Any]) -> list[str]:
     found = []
     if values["peak_yield"] < values["initial_yield"]:
         found.append("peak_yield at least initial_yield")
-    limit = steepest_dilation(values.get("stress_invariant_ratio", 2.0 / 3.0), values.get("biaxial_ratio", 1.16))
+    limit = steepest_dilation(values["stress_invariant_ratio"], values["biaxial_ratio"])
     if values["dilation_angle"] > limit * (1.0 + 1e-9):
         found.append(
             f"dilation_angle at most {math.degrees(limit):.4g} deg with this stress_invariant_ratio and "
@@ -288,30 +288,7 @@ LUBLINER = Law(
     id=4,
     name="lubliner",
     title="damage-plasticity of quasi-brittle materials (Lubliner; Lee and Fenves)",
-    parameters=(
-        YOUNG,
-        POISSON,
-        Parameter("dilation_angle", "rad", 1e-3, 1.3, None, "psi in the p-q plane", "5 to 40 deg"),
-        Parameter("flow_eccentricity", "1", 1e-4, 10.0, 0.1, "how fast G nears its asymptote", "0.05 to 0.5"),
-        Parameter("stress_invariant_ratio", "1", 0.501, 1.0, 2.0 / 3.0, "Kc", "0.51 to 1"),
-        Parameter("biaxial_ratio", "1", 1.0, 3.0, 1.16, "f0, biaxial over uniaxial compressive yield", "1.05 to 1.3"),
-        Parameter("initial_yield", "Pa", 1e-9, 1e16, None, "compressive yield stress at no inelastic strain"),
-        Parameter("peak_yield", "Pa", 1e-9, 1e16, None, "compressive strength"),
-        Parameter("strain_at_peak", "1", 1e-9, 10.0, None, "inelastic strain there", "0.1 to 5 %"),
-        Parameter("compressive_damage", "1", 0.0, 0.99, 0.5, "d_c: damage rate over its limit", "0.4 to 0.95"),
-        Parameter("tensile_yield", "Pa", 1e-9, 1e16, None, "tensile strength"),
-        Parameter("tensile_decay", "1", 0.0, 1e9, 1000.0, "lambda: decay of the tensile stress per cracking strain"),
-        Parameter("tensile_damage", "1", 0.0, 0.99, 0.5, "d_t: damage rate over its limit", "0.4 to 0.95"),
-        Parameter("tension_recovery", "1", 0.0, 1.0, 0.0, "w_t: stiffness regained in tension after crushing"),
-        Parameter("compression_recovery", "1", 0.0, 1.0, 1.0, "w_c: stiffness regained as cracks close"),
-        Parameter("largest_inelastic_strain", "1", 1e-6, 10.0, 0.1, "compressive strains up to here are met"),
-        Parameter("largest_cracking_strain", "1", 1e-6, 10.0, 0.1, "cracking strains up to here are met"),
-        Parameter("max_damage", "1", 0.0, 0.999999, 0.99, "damage stops here, so that a stiffness remains"),
-        Parameter(
-            "crack_strain", "1", default="current", choices=CRACK_STRAIN,
-            description="stress by which crack strain becomes plastic strain: of the moment, or the first yield (Y)",
-        ),
-    ),
+    parameters=PARAMETERS["lubliner"],
     derived=("a", "gamma", "alpha", "beta", "m", "n", "tan_dilation"),
     state_names=(
         "equivalent_plastic_strain", "damage", "compressive_plastic_strain", "tensile_plastic_strain",

@@ -24,8 +24,7 @@ import numpy as np
 from graben.mechanics.compiled import kernel
 from graben.mechanics.materials.hardening import BARCELONA, harden
 
-CURRENT, PRINTED = 0, 1
-CRACK_STRAIN = ("current", "printed")
+CURRENT, PRINTED = 0, 1  # the order of the declared choices
 _NONE = np.empty(0)
 _SAMPLES = 64  # of the strains over which a limit is sought
 

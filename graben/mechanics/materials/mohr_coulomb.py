@@ -21,9 +21,10 @@ from typing import Any
 
 import numpy as np
 
+from graben.declared.laws import PARAMETERS
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.elastic import POISSON, YOUNG, add_elastic, fill_elastic, finite, moduli
-from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law, Parameter
+from graben.mechanics.materials.elastic import add_elastic, fill_elastic, finite, moduli
+from graben.mechanics.materials.law import NOT_CONVERGED, NOT_FINITE, OK, Law
 from graben.mechanics.tensors.principal import (
     back_plane_stress,
     back_plane_tangent,
@@ -228,7 +229,7 @@ def update_mohr_coulomb(deps, sig, state, par, length, tangent):
 
 def _check(values: Mapping[str, Any]) -> list[str]:
     found = []
-    if values.get("dilation_angle", 0.0) > values["friction_angle"]:
+    if values["dilation_angle"] > values["friction_angle"]:
         found.append("dilation_angle at most friction_angle")
     return found
 
@@ -237,22 +238,7 @@ MOHR_COULOMB = Law(
     id=2,
     name="mohr-coulomb",
     title="Mohr-Coulomb with a tension cut-off, perfectly plastic",
-    parameters=(
-        YOUNG,
-        POISSON,
-        Parameter("friction_angle", "rad", 0.0, math.radians(80.0), None, "phi", "25 to 55 deg"),
-        Parameter("dilation_angle", "rad", 0.0, math.radians(80.0), 0.0, "psi, at most phi", "0 to 15 deg"),
-        Parameter("cohesion", "Pa", 0.0, 1e16, None, "c", "0 to 60 MPa"),
-        Parameter(
-            "tensile_strength",
-            "Pa",
-            0.0,
-            1e16,
-            0.0,
-            "T of the cut-off; the apex of the cone limits it",
-            "0 to 12 MPa",
-        ),
-    ),
+    parameters=PARAMETERS["mohr-coulomb"],
     state_names=("equivalent_plastic_strain",),
     initial_state=lambda par: np.zeros(1),
     prepare=prepare_mohr_coulomb,

@@ -21,8 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from graben.declared.laws import PARAMETERS
 from graben.mechanics.compiled import kernel
-from graben.mechanics.materials.law import NOT_FINITE, OK, Law, Parameter
+from graben.mechanics.materials.law import NOT_FINITE, OK, Law
 
 _STIFFNESS = 6  # 36 slots, row by row, over (xx, yy, zz, xy, yz, zx) with engineering shears
 
@@ -96,26 +97,7 @@ TRANSVERSE = Law(
     id=6,
     name="transverse-elastic",
     title="linear transversely isotropic elasticity",
-    parameters=(
-        Parameter(
-            "young_modulus", "Pa", 1e-3, 1e16, None, "E, in the plane of isotropy (along the layers)", "1 to 100 GPa"
-        ),
-        Parameter("young_modulus_across", "Pa", 1e-3, 1e16, None, "E', along the axis of symmetry", "0.3 to 1 of E"),
-        Parameter("poisson_ratio", "1", -0.99, 0.99, None, "nu, within the plane of isotropy", "0.1 to 0.4"),
-        Parameter(
-            "poisson_ratio_across",
-            "1",
-            -2.0,
-            2.0,
-            None,
-            "nu', contraction along the layers per extension across them",
-            "0.05 to 0.3",
-        ),
-        Parameter(
-            "shear_modulus_across", "Pa", 1e-3, 1e16, None, "G', in planes that hold the axis", "0.2 to 0.5 of E'"
-        ),
-        Parameter("axis_angle", "rad", -7.0, 7.0, 0.0, "angle from x to the axis of symmetry, counter-clockwise"),
-    ),
+    parameters=PARAMETERS["transverse-elastic"],
     derived=tuple(f"c{i}{j}" for i in range(6) for j in range(6)),
     prepare=prepare_transverse,
     state_names=("equivalent_plastic_strain", "damage"),

@@ -6,10 +6,11 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from graben.declared.laws import PARAMETERS, parameter
 from graben.errors import Refused
 from graben.schemas.quantities import Integer, Length, Number, Switch, key
 from graben.schemas.scene import InputFile, Model, Scene
-from graben.schemas.scenes.material import UNITS, parameter_to_si
+from graben.schemas.scenes.material import parameter_to_si
 
 
 class Prior(Model):
@@ -113,7 +114,7 @@ class CalibrateScene(Scene):
         "plane-strain",
         "axial (yy) strain and lateral (xx) stress are prescribed; zz: no strain, or the lateral stress",
     )
-    law: str = key("drucker-prager", "constitutive law: " + ", ".join(UNITS))
+    law: str = key("drucker-prager", "constitutive law: " + ", ".join(PARAMETERS))
     fixed: dict[str, Any] = Field(
         {"hardening": "exponential", "damage": "ductile"},
         description="parameters that are given: quantities with units, bare numbers, words, tables",
@@ -144,8 +145,8 @@ class CalibrateScene(Scene):
 
     @model_validator(mode="after")
     def _parameters(self) -> Self:
-        if self.law not in UNITS:
-            raise ValueError(f"law = {self.law!r}: expected one of {', '.join(UNITS)}")
+        if self.law not in PARAMETERS:
+            raise ValueError(f"law = {self.law!r}: expected one of {', '.join(PARAMETERS)}")
         faults = []
         for name, value in self.fixed.items():
             try:
@@ -163,9 +164,10 @@ class CalibrateScene(Scene):
         return self
 
     def _free_faults(self, name: str, free: Free) -> list[str]:
-        unit = UNITS[self.law].get(name)
-        if unit is None or unit in ("word", "table"):
-            return [f"free.{name}: expected a number parameter of {self.law}: {', '.join(self._numbers())}"]
+        p = parameter(self.law, name)
+        if p is None or p.form != "number":
+            numbers_of = ", ".join(p.name for p in PARAMETERS[self.law] if p.form == "number")
+            return [f"free.{name}: expected a number parameter of {self.law}: {numbers_of}"]
         faults, numbers = [], {}
         for part in ("lower", "upper", "initial"):
             value = getattr(free, part)
@@ -175,6 +177,9 @@ class CalibrateScene(Scene):
                 numbers[part] = parameter_to_si(self.law, name, value)
             except Refused as error:
                 faults.append(f"free.{name}.{part} = {value!r}: expected {error}")
+                continue
+            if not p.holds(numbers[part]):
+                faults.append(f"free.{name}.{part} = {value!r}: expected {p.bounds}")
         if faults:
             return faults
         if not numbers["lower"] < numbers["upper"]:
@@ -201,9 +206,6 @@ class CalibrateScene(Scene):
             if part == "deviation" and number <= 0.0:
                 faults.append(f"free.{name}.prior.deviation = {value!r}: expected above zero")
         return faults
-
-    def _numbers(self) -> list[str]:
-        return [n for n, u in UNITS[self.law].items() if u not in ("word", "table")]
 
     def fixed_si(self) -> dict[str, Any]:
         """The fixed parameters in SI."""

@@ -17,134 +17,40 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
+from graben.declared.laws import PARAMETERS, parameter
 from graben.errors import BadInput, Fault, Refused
 from graben.schemas.files import whole_file
-from graben.schemas.quantities import KNOWN, key, plain_number, to_si
+from graben.schemas.quantities import key, plain_number, to_si
 from graben.schemas.reading import parse_toml, read_toml
 from graben.schemas.scene import InputFile, Model
 
 _LARGEST = 1e12
 """Largest magnitude of a dimensionless parameter."""
 
-_ELASTIC = {"young_modulus": "Pa", "poisson_ratio": "1"}
-_DUCTILE = {
-    "damage": "word",
-    "initiation_strain_050": "1",
-    "initiation_strain_060": "1",
-    "failure_displacement": "m",
-    "max_damage": "1",
-}
-_HARDENING = {
-    "hardening": "word",
-    "initial_yield": "Pa",
-    "hardening_gain": "Pa",
-    "hardening_rate": "1",
-    "peak_yield": "Pa",
-    "strain_at_peak": "1",
-    "hardening_modulus": "Pa",
-    "hardening_table": "table",
-}
-_METAL = {
-    "hardening": "word",
-    "initial_yield": "Pa",
-    "hardening_modulus": "Pa",
-    "hardening_gain": "Pa",
-    "hardening_rate": "1",
-    "hardening_table": "table",
-}
-
-UNITS: dict[str, dict[str, str]] = {
-    "elastic": {**_ELASTIC},
-    "transverse-elastic": {
-        "young_modulus": "Pa",
-        "young_modulus_across": "Pa",
-        "poisson_ratio": "1",
-        "poisson_ratio_across": "1",
-        "shear_modulus_across": "Pa",
-        "axis_angle": "rad",
-    },
-    "j2": {**_ELASTIC, **_METAL},
-    "mohr-coulomb": {
-        **_ELASTIC,
-        "friction_angle": "rad",
-        "dilation_angle": "rad",
-        "cohesion": "Pa",
-        "tensile_strength": "Pa",
-    },
-    "drucker-prager": {
-        **_ELASTIC,
-        "friction_angle": "rad",
-        "dilation_angle": "rad",
-        "flow_stress_ratio": "1",
-        **_HARDENING,
-        **_DUCTILE,
-    },
-    "lubliner": {
-        **_ELASTIC,
-        "dilation_angle": "rad",
-        "flow_eccentricity": "1",
-        "stress_invariant_ratio": "1",
-        "biaxial_ratio": "1",
-        "initial_yield": "Pa",
-        "peak_yield": "Pa",
-        "strain_at_peak": "1",
-        "compressive_damage": "1",
-        "tensile_yield": "Pa",
-        "tensile_decay": "1",
-        "tensile_damage": "1",
-        "tension_recovery": "1",
-        "compression_recovery": "1",
-        "largest_inelastic_strain": "1",
-        "largest_cracking_strain": "1",
-        "max_damage": "1",
-        "crack_strain": "word",
-    },
-    "erve": {
-        **_ELASTIC,
-        "damage_threshold": "Pa",
-        "subdomains": "1",
-        "max_damage_step": "1",
-        "split": "word",
-        "hardening": "table",
-    },
-    "energy-damage": {**_ELASTIC, "damage_threshold": "Pa", "split": "word", "max_damage": "1", **_METAL},
-}
-"""law -> parameter -> SI unit, "word" or "table" (plastic strain, stress in Pa). A test holds it to the laws."""
-
-_OURS = frozenset(UNITS)
-
-
-def declare(law: str, units: Mapping[str, str]) -> None:
-    """Let scenes of this process name a law from outside.
-
-    Refused for the name of a law of the package, and for a unit that scenes do not know.
-    """
-    if law in _OURS:
-        raise Refused(f"another name: {law!r} is a law of the package")
-    for name, unit in units.items():
-        if unit != "1" and unit not in KNOWN:
-            raise Refused(f"{name} in one of the units 1, {', '.join(KNOWN)}, not {unit!r}")
-    UNITS[law] = dict(units)
-
 
 def parameter_to_si(law: str, name: str, value: Any) -> Any:
     """One value as files give it -> a float in SI, a word, or rows of floats. Refused says what was expected."""
-    unit = UNITS[law].get(name)
-    if unit is None:
-        raise Refused(f"a parameter of {law}: {', '.join(UNITS[law])}")
-    if unit == "word" and isinstance(value, list | tuple) and f"{name}_table" in UNITS[law]:
-        unit = "table"  # rows instead of the word "table" with rows elsewhere
-    if unit == "word":
+    p = parameter(law, name)
+    if p is None:
+        raise Refused(f"a parameter of {law}: {', '.join(p.name for p in PARAMETERS[law])}")
+    if p.form == "word" and "table" in p.choices and isinstance(value, list | tuple):
+        return _rows(value, "Pa")  # rows instead of the word "table" with rows elsewhere
+    if p.form == "word":
         if not isinstance(value, str):
             raise Refused("a word")
         return value
-    if unit == "table":
-        if not isinstance(value, list | tuple) or not all(isinstance(r, list | tuple) and len(r) == 2 for r in value):
-            raise Refused('rows of plastic strain and stress, such as [[0.0, "60 MPa"], [0.1, "90 MPa"]]')
-        return [[_number(x), to_si(y, "Pa", tiny=True)] for x, y in value]
-    if unit == "1":
+    if p.form == "table":
+        return _rows(value, p.unit)
+    if p.unit == "1":
         return _number(value)
-    return to_si(value, unit, tiny=True)  # a fit may end at 1e-17
+    return to_si(value, p.unit, tiny=True)  # a fit may end at 1e-17
+
+
+def _rows(value: Any, unit: str) -> list[list[float]]:
+    """Rows of a number and a quantity."""
+    if not isinstance(value, list | tuple) or not all(isinstance(r, list | tuple) and len(r) == 2 for r in value):
+        raise Refused('rows of plastic strain and stress, such as [[0.0, "60 MPa"], [0.1, "90 MPa"]]')
+    return [[_number(x), to_si(y, unit, tiny=True)] for x, y in value]
 
 
 def _number(value: Any) -> float:
@@ -162,8 +68,8 @@ def _number(value: Any) -> float:
 
 def _convert(law: Any, parameters: Any) -> tuple[dict[str, Any], list[tuple[str, Any, str]]]:
     """Values in SI, and every fault as (key, value, expected)."""
-    if law not in UNITS:
-        return {}, [("law", law, "one of " + ", ".join(UNITS))]
+    if law not in PARAMETERS:
+        return {}, [("law", law, "one of " + ", ".join(PARAMETERS))]
     if not isinstance(parameters, Mapping):
         return {}, [("parameters", parameters, "a table of parameters")]
     values: dict[str, Any] = {}
@@ -180,7 +86,7 @@ class MaterialTable(Model):
     """Either `file`, or `law` and `parameters`."""
 
     file: InputFile | None = key(None, "a NAME.material.toml, or calibrate's artifact, instead of law and parameters")
-    law: str | None = key(None, "name of the law: " + ", ".join(UNITS))
+    law: str | None = key(None, "name of the law: " + ", ".join(PARAMETERS))
     parameters: dict[str, Any] = key({}, "the law's parameters: quantities with units, bare numbers, words, tables")
 
     @model_validator(mode="after")
@@ -237,12 +143,12 @@ def material_text(law: str, values: Mapping[str, Any], note: str = "") -> str:
     """A NAME.material.toml that reads back to the same bits; readable units follow as comments."""
     lines = [f"# {line}" for line in note.splitlines()] + [f'law = "{law}"', "", "[parameters]"]
     for name, value in values.items():
-        unit = UNITS[law][name]
-        if unit == "word" and not isinstance(value, str):
-            unit = "table"
-        if unit == "word":
+        p = parameter(law, name)
+        assert p is not None  # values are of a law that took them
+        unit = p.unit
+        if isinstance(value, str):
             lines.append(f'{name} = "{value}"')
-        elif unit == "table":
+        elif p.form != "number":  # rows may stand for the word "table"
             rows = ", ".join(f'[{float(x)!r}, "{float(y)!r} Pa"]' for x, y in value)
             lines.append(f"{name} = [{rows}]")
         elif unit == "1":

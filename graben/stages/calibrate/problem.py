@@ -168,12 +168,6 @@ def problem_of(scene: CalibrateScene, scene_path: Path, name: str, threads: int 
     law = LAWS[scene.law]
     fixed = scene.fixed_si()
     faults = []
-    for parameter, low, high in zip(names, lower, upper):
-        p = law.parameter(parameter)
-        for end, bound in (("lower", low), ("upper", high)):
-            if not p.lower <= bound <= p.upper:
-                expected = f"from {p.lower:g} to {p.upper:g} {p.unit}"
-                faults.append(Fault(str(scene_path), f"free.{parameter}.{end}", f"{bound:g}", expected))
     stand_in = {**fixed, **dict(zip(names, upper))}
     for parameter, text in law.faults(stand_in):
         if parameter:

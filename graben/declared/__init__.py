@@ -1,0 +1,1 @@
+"""What every other room reads and none computes: parameters of laws, and knobs of accuracy."""
