@@ -19,6 +19,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
+from graben.declared.knobs import knob
 from graben.errors import Refused
 
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -247,3 +248,12 @@ def key(default: Any = ..., description: str = "", **constraints: Any) -> Any:
     Typed Any, so that a field declared as a float may be given its default as ``"65 GPa"``.
     """
     return Field(default, description=description, **constraints)
+
+
+def knob_key(kind: str, name: str, description: str, **constraints: Any) -> Any:
+    """A scene key that is a knob of accuracy: its default is the declared one, and None where fidelity turns it."""
+    found = knob(kind, name)
+    if not found.steady:
+        return key(None, f"{description}; left out: {found}", **constraints)
+    value = found.standard
+    return key(value if found.unit == "1" else f"{value:g} {found.unit}", description, **constraints)

@@ -9,17 +9,15 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, PrivateAttr, ValidationError, ValidationInfo
 
+from graben.declared.knobs import Fidelity
 from graben.errors import BadInput, Fault, Refused
 from graben.schemas.quantities import Integer, key
 from graben.schemas.reading import parse_toml, read_toml
 from graben.schemas.toml_text import toml_text, toml_value
-
-Fidelity = Literal["draft", "standard", "reference"]
-
 
 _SETTING = "# graben set: "
 """Begins each line on top of a scene's text that notes an override."""

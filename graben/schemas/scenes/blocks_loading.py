@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -20,8 +21,12 @@ from graben.schemas.quantities import (
     Switch,
     Time,
     key,
+    knob_key,
 )
 from graben.schemas.scene import Model, Name
+
+_knob = partial(knob_key, "blocks")
+
 
 Point = tuple[Length, Length]
 SpeedCourse = list[tuple[Time, Speed]]
@@ -209,8 +214,8 @@ class Programme(Model):
 class Numerics(Model):
     """Knobs that trade accuracy for time; left out, fidelity sets them."""
 
-    steps: Integer | None = key(
-        None,
+    steps: Integer | None = _knob(
+        "numerics.steps",
         "steps of loading (of a programme's end): fewer means heavier scaled masses, so more inertia",
         gt=100,
         le=10**12,
@@ -245,8 +250,8 @@ class Numerics(Model):
     damping_coefficient: Frequency | None = key(
         None, "viscous: drag over (scaled) mass and velocity, at most one over the time step", ge=0
     )
-    consolidation_tolerance: Number = key(
-        1e-3, "unbalanced over mean zone force that ends consolidation", ge=1e-12, le=1
+    consolidation_tolerance: Number = _knob(
+        "numerics.consolidation_tolerance", "unbalanced over mean zone force that ends consolidation", ge=1e-12, le=1
     )
     energy_limit: Number = key(0.05, "largest error of the energy ledger over the work done", ge=1e-12, le=1e3)
     stop_loose_blocks: Switch = key(

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from graben.declared.laws import PARAMETERS, parameter
 from graben.errors import Refused
-from graben.schemas.quantities import Integer, Length, Number, Switch, key
+from graben.schemas.quantities import Integer, Length, Number, Switch, key, knob_key
 from graben.schemas.scene import InputFile, Model, Scene
 from graben.schemas.scenes.material import parameter_to_si
+
+_knob = partial(knob_key, "calibrate")
 
 
 class Prior(Model):
@@ -62,11 +65,13 @@ class WeightTable(Model):
 
 
 class SwarmTable(Model):
-    """Budget of the global search and rule of the swarm, Y 2.6.1; keys left out follow the fidelity."""
+    """Budget of the global search and rule of the swarm, Y 2.6.1."""
 
-    starts: Integer | None = key(None, "searches with different seeds", ge=1, le=1000)
-    particles: Integer | None = key(None, "particles of each swarm, or population (Y: 24)", ge=2, le=100_000)
-    generations: Integer | None = key(None, "generations (Y: 100)", ge=0, le=100_000)
+    starts: Integer | None = _knob("swarm.starts", "searches with different seeds", ge=1, le=1000)
+    particles: Integer | None = _knob(
+        "swarm.particles", "particles of each swarm, or population (Y: 24)", ge=2, le=100_000
+    )
+    generations: Integer | None = _knob("swarm.generations", "generations (Y: 100)", ge=0, le=100_000)
     inertia: Number = key(0.73, "inertia omega of Y (2.54) (Y: 1.2)", ge=0, le=2)
     inertia_reduction: Number = key(0.0, "fraction of the inertia lost in each generation (Y: 0.1)", ge=0, lt=1)
     cognitive: Number = key(1.5, "trust in a particle's own best, c1 (Y: 2)", ge=0, le=4)
@@ -75,15 +80,17 @@ class SwarmTable(Model):
 
 
 class RefineTable(Model):
-    """Levenberg-Marquardt, Y 2.6.3; keys left out follow the fidelity."""
+    """Levenberg-Marquardt, Y 2.6.3."""
 
-    best: Integer | None = key(None, "particles of each swarm to refine, apart from one another", ge=1, le=1000)
+    best: Integer | None = _knob(
+        "refine.best", "particles of each swarm to refine, apart from one another", ge=1, le=1000
+    )
     damping: Number = key(1e-2, "first lambda, on scaled columns (Y: 10)", ge=1e-15, le=1e15)
     factor: Number = key(4.0, "ratio of neighbouring trial values of lambda (Y: 1.1)", ge=1.001, le=1e6)
     move_limit: Number = key(
         0.1, "largest move in one iteration, as a fraction of a parameter's range", ge=1e-6, le=1
     )
-    iterations: Integer = key(40, "at most this many iterations (Y: 20)", ge=0, le=100_000)
+    iterations: Integer = _knob("refine.iterations", "at most this many iterations (Y: 20)", ge=0, le=100_000)
 
 
 _FREE: Any = {
@@ -121,9 +128,7 @@ class CalibrateScene(Scene):
     )
     free: dict[str, Free] = Field(_FREE, description="parameters to find, with bounds; scale = linear or log")
     length: Length = key("10 m", "characteristic length that the curves stand for, for displacement-based damage")
-    increments: Integer | None = key(
-        None, "increments between two points of a curve; follows the fidelity", ge=1, le=1000
-    )
+    increments: Integer | None = _knob("increments", "increments between two points of a curve", ge=1, le=1000)
     weights: WeightTable = key(WeightTable(), "weights of the residuals")
     search: Literal["swarm", "appso", "dds", "differential-evolution", "cma-es"] = key(
         "swarm", "the global search; appso: a swarm that does not wait for its slowest particle (Y 2.6.2)"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from graben.declared.knobs import knob
 from graben.schemas.quantities import (
     Acceleration,
     Density,
@@ -17,6 +19,7 @@ from graben.schemas.quantities import (
     Switch,
     Time,
     key,
+    knob_key,
 )
 from graben.schemas.scene import InputFile, Model, Name, Scene
 from graben.schemas.scenes.material import MaterialTable
@@ -57,6 +60,7 @@ _SLOPE_OUTLINE: Any = [
     ["30 m", "20 m"],
     ["0 m", "20 m"],
 ]
+_knob, _SIZE = partial(knob_key, "fem"), knob("fem", "mesh.size")
 _UNDER_LOAD: Any = {"start": ["55 m", "50 m"], "end": ["60 m", "50 m"], "size": "0.4 m", "growth": 0.05}
 _SLOPE_SUPPORTS: Any = [
     {"name": "left", "start": ["0 m", "0 m"], "end": ["0 m", "20 m"], "fix": "x"},
@@ -112,8 +116,8 @@ class Mesh(Model):
     )
     outline: list[Point] = key(_SLOPE_OUTLINE, "paved: corner points of the polygon, in order", max_length=100_000)
     file: InputFile | None = key(None, "file: mesh file with 4-node quads (Gmsh, VTU, Abaqus, ...), coordinates in m")
-    draft_factor: Number = key(2.7, "all sizes are multiplied by this at draft fidelity", ge=1, le=1e3)
-    reference_factor: Number = key(0.33, "all sizes are multiplied by this at reference fidelity", ge=1e-3, le=1)
+    draft_factor: Number = key(_SIZE.draft.factor, "factor of all sizes at draft fidelity", ge=1, le=1e3)
+    reference_factor: Number = key(_SIZE.reference.factor, "factor of all sizes at reference fidelity", ge=1e-3, le=1)
 
     @model_validator(mode="after")
     def _file_for_method(self) -> Self:
@@ -162,10 +166,14 @@ class Stepping(Model):
     )
     end: Time = key("100 s", "length of the load history after gravity", gt=0)
     first: Time = key("1 s", "first step", gt=0)
-    largest: Time = key("2 s", "largest step", gt=0)
-    smallest: Time = key("0.02 s", "a step that fails is halved; failure is declared below this length", gt=0)
+    largest: Time = _knob("stepping.largest", "largest step", gt=0)
+    smallest: Time = _knob(
+        "stepping.smallest", "a step that fails is halved; failure is declared below this length", gt=0
+    )
     save_every: Time = key("4 s", "load time between saved states (the last state is always saved)", gt=0)
-    tolerance: Number = key(1e-6, "unbalanced force over the largest of loads and reactions", ge=1e-14, lt=1e-2)
+    tolerance: Number = _knob(
+        "stepping.tolerance", "unbalanced force over the largest of loads and reactions", ge=1e-14, lt=1e-2
+    )
     max_iterations: Integer = key(20, "factorisations per step", ge=3, le=10_000)
     relaxation: Time = key(
         "0 s",

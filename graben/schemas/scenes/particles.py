@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Literal
 
 from pydantic import model_validator
@@ -16,8 +17,11 @@ from graben.schemas.quantities import (
     Pressure,
     Switch,
     key,
+    knob_key,
 )
 from graben.schemas.scene import Model, Name, Scene
+
+_knob = partial(knob_key, "particles")
 
 
 class GrainSize(Model):
@@ -43,7 +47,9 @@ class Contact(Model):
     normal_stiffness: ContactStiffness | None = key(
         None, "of one grain; left out: such that the pressure gives the overlap below", gt=0
     )
-    overlap: Number = key(0.005, "mean overlap over the smallest diameter at the pressure", ge=1e-9, le=0.05)
+    overlap: Number = _knob(
+        "contact.overlap", "mean overlap over the smallest diameter at the pressure", ge=1e-9, le=0.05
+    )
     wall_stiffness_ratio: Number = key(
         10.0, "stiffness of floor, piston and walls over that of a grain", ge=1e-6, le=1e6
     )
@@ -58,8 +64,11 @@ class Loading(Model):
 
     gravity: Acceleration = key("9.81 m/s^2", "gravity", gt=0)
     pressure: Pressure = key("30 Pa", "pressure of the piston; see docs for why it need not be the machine's", gt=0)
-    ramp: Number = key(
-        5.0, "time over which the pressure rises, in half periods of the bed's slowest mode", ge=1e-3, le=1e6
+    ramp: Number = _knob(
+        "loading.ramp",
+        "time over which the pressure rises, in half periods of the bed's slowest mode",
+        ge=1e-3,
+        le=1e6,
     )
 
 
@@ -74,12 +83,15 @@ class Shaking(Model):
 class Numerics(Model):
     """Knobs that trade accuracy for time; left out, fidelity sets them."""
 
-    safety: Number | None = key(None, "time step over the estimated critical one", ge=1e-6, le=1)
-    rest: Number | None = key(
-        None, "kinetic energy over weight times smallest radius at which a poured bed has settled", ge=1e-30, le=1e6
+    safety: Number | None = _knob("numerics.safety", "time step over the estimated critical one", ge=1e-6, le=1)
+    rest: Number | None = _knob(
+        "numerics.rest",
+        "kinetic energy over weight times smallest radius at which a poured bed has settled",
+        ge=1e-30,
+        le=1e6,
     )
-    balance: Number | None = key(
-        None, "unbalanced force over mean contact force at which the bed is at rest", ge=1e-15, le=1e3
+    balance: Number | None = _knob(
+        "numerics.balance", "unbalanced force over mean contact force at which the bed is at rest", ge=1e-15, le=1e3
     )
     loose_fraction: Number = key(0.25, "solid fraction of the column that is poured", ge=0.01, le=0.35)
     energy_limit: Number = key(0.05, "largest allowed error of the energy balance", ge=1e-12, le=1e3)

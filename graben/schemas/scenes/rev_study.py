@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from typing import Literal
 
 from pydantic import field_validator, model_validator
 
-from graben.schemas.quantities import Integer, Length, Number, key
+from graben.schemas.quantities import Integer, Length, Number, key, knob_key
 from graben.schemas.scene import InputFile, Model, Scene
+
+_knob = partial(knob_key, "rev-study")
+
 
 Property = Literal["secant_modulus", "poisson_ratio", "peak_stress", "strain_at_peak", "dilation"]
 
@@ -25,8 +29,8 @@ class Samples(Model):
     centres: tuple[tuple[Length, Length], ...] = key(
         (), "their centres, [x, y] each; none: a grid (see grid)", max_length=100_000
     )
-    grid: Integer = key(
-        3, "centres per side of a square grid, as wide as the largest radius leaves room", ge=1, le=50
+    grid: Integer = _knob(
+        "samples.grid", "centres per side of a square grid, as wide as the largest radius leaves room", ge=1, le=50
     )
 
     @field_validator("radii")
@@ -56,9 +60,7 @@ class Tests(Model):
         0.05, "largest relative difference of a mean from that at the largest radius", ge=1e-9, lt=1
     )
     variation: Number = key(0.10, "largest coefficient of variation to be accepted", ge=1e-9, lt=1)
-    resamples: Integer | None = key(
-        None, "draws of the bootstrap (fidelity: draft 500, standard 2000, reference 20000)", ge=100, le=1_000_000
-    )
+    resamples: Integer | None = _knob("tests.resamples", "draws of the bootstrap", ge=100, le=1_000_000)
 
 
 class Calibration(Model):

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, model_validator
 
+from graben.declared.knobs import knob
 from graben.errors import Refused
-from graben.schemas.quantities import Density, Integer, Length, Number, key
+from graben.schemas.quantities import Density, Integer, Length, Number, key, knob_key
 from graben.schemas.scene import Model, Scene
 from graben.schemas.scenes.material import MaterialTable
 
@@ -34,6 +36,10 @@ _ST52: Any = {
 }
 
 
+_knob = partial(knob_key, "scratch")
+_SIZE, _SPEED = knob("scratch", "mesh.size"), knob("scratch", "numerics.slide_speed")
+
+
 class Specimen(Model):
     """Block whose upper surface is scratched; base, ends and sides are held. One half is computed."""
 
@@ -53,8 +59,8 @@ class Mesh(Model):
     size: Length = key("1.5 um", "edge under the path at standard fidelity", gt=0)
     growth: Number = key(1.25, "ratio of neighbouring edges outside the fine range", ge=1, le=2)
     growth_depth: Number = key(1.12, "the same from the surface down", ge=1, le=2)
-    draft_factor: Number = key(1.7, "the edge is multiplied by this at draft fidelity", ge=1, le=1e3)
-    reference_factor: Number = key(0.75, "the edge is multiplied by this at reference fidelity", ge=1e-3, le=1)
+    draft_factor: Number = key(_SIZE.draft.factor, "factor of the edge at draft fidelity", ge=1, le=1e3)
+    reference_factor: Number = key(_SIZE.reference.factor, "factor of the edge at reference fidelity", ge=1e-3, le=1)
 
 
 class Tip(Model):
@@ -89,21 +95,29 @@ def _one_or_eight(value: Any) -> Any:
 class Numerics(Model):
     """What trades accuracy for time. Speeds are top speeds as shares of the longitudinal wave speed."""
 
-    points: Annotated[Literal[1, 8], BeforeValidator(_one_or_eight)] = key(
-        1, "integration points: 1 with hourglass control, or 8 with mean dilatation (reference)"
+    points: Annotated[Literal[1, 8], BeforeValidator(_one_or_eight)] = _knob(
+        "numerics.points", "integration points: 1 with hourglass control, or 8 with mean dilatation (reference)"
     )
     indent_speed: Number = key(0.003, "indentation; faster makes the tip bounce", ge=1e-9, le=0.1)
     slide_speed: Number = key(0.02, "sliding", ge=1e-9, le=0.1)
     lift_speed: Number = key(0.006, "lifting", ge=1e-9, le=0.1)
-    draft_speed_factor: Number = key(2.0, "speeds are multiplied by this at draft fidelity", ge=1, le=10)
-    reference_speed_factor: Number = key(0.5, "speeds are multiplied by this at reference fidelity", ge=1e-3, le=1)
-    safety: Number = key(0.8, "step over volume / largest face / wave speed", ge=1e-3, le=1)
-    floor: Number = key(0.3, "share of the first step below which an element gets mass instead", ge=1e-6, le=1)
+    draft_speed_factor: Number = key(_SPEED.draft.factor, "factor of the speeds at draft fidelity", ge=1, le=10)
+    reference_speed_factor: Number = key(
+        _SPEED.reference.factor, "factor of the speeds at reference fidelity", ge=1e-3, le=1
+    )
+    safety: Number = _knob("numerics.safety", "step over volume / largest face / wave speed", ge=1e-3, le=1)
+    floor: Number = _knob(
+        "numerics.floor", "share of the first step below which an element gets mass instead", ge=1e-6, le=1
+    )
     mass_cap: Number = key(0.05, "the run stops when added mass exceeds this share of the specimen's", ge=0, le=1e6)
     refresh: Integer = key(25, "steps between refreshes of the step, of removal and of the history", ge=1, le=500)
-    hourglass: Number = key(0.02, "hourglass stiffness over the elastic bending stiffness", ge=0, le=1)
-    viscosity: Number = key(0.06, "linear bulk viscosity, share of the critical one", ge=0, le=0.5)
-    penalty: Number = key(0.5, "contact stiffness over E A / h of the surface element", ge=1e-6, le=5)
+    hourglass: Number = _knob(
+        "numerics.hourglass", "hourglass stiffness over the elastic bending stiffness", ge=0, le=1
+    )
+    viscosity: Number = _knob("numerics.viscosity", "linear bulk viscosity, share of the critical one", ge=0, le=0.5)
+    penalty: Number = _knob(
+        "numerics.penalty", "contact stiffness over E A / h of the surface element", ge=1e-6, le=5
+    )
     energy_limit: Number = key(0.03, "the run stops at this energy error, share of the external work", ge=1e-12, le=1)
     volume_limit: Number = key(0.02, "without damage, the run stops when det F leaves 1 by this", ge=1e-12, le=0.5)
 

@@ -9,12 +9,7 @@ import numpy as np
 
 from graben.schemas.scenes.blocks import BlocksScene, Tessellation
 from graben.stages.shared.estimate import Estimate, tiles, work
-
-# Steps of loading for each fidelity; their measured trade is in docs/studies/blocks-fidelity.md
-FIDELITY = {"draft": 12_500, "standard": 50_000, "reference": 200_000}
-# Largest inertial number of a compression. Measured: kinetic stays below 5 % of stored energy from 0.1 to 4 MPa.
-_INERTIA = 0.0125
-_MOST = 20  # times the steps of the fidelity; below that confinement the run warns
+from graben.stages.shared.fidelity import setting
 
 _VORONOI_AREA = 0.955  # mean area of a Voronoi block over its edge squared
 _ZONES = 4  # of a block that has its corners only
@@ -33,11 +28,11 @@ def steps_of(scene: BlocksScene, blocks: float) -> int:
     ----------
     blocks : their number, estimated or counted
     """
-    if scene.numerics.steps:
-        return scene.numerics.steps
-    steps = FIDELITY[scene.fidelity]
+    rule = setting(scene, "numerics.steps")
+    if isinstance(rule, int):
+        return rule
     if scene.programme is not None:
-        return steps
+        return int(rule.steps)
     loading, corners = scene.loading, np.array(scene.domain.corners)
     width, height = np.ptp(corners, axis=0)
     fastest = max(abs(v) for _, v in loading.speed_course or ((0.0, loading.speed),))
@@ -45,7 +40,7 @@ def steps_of(scene: BlocksScene, blocks: float) -> int:
     along = math.sqrt(blocks * height / width)
     lowest = min(pressure for _, pressure in loading.confining_course or ((0.0, loading.confining_pressure),))
     stretch = strain * along * math.sqrt(scene.rock.young / lowest)
-    return max(steps, min(math.ceil(stretch / _INERTIA), _MOST * steps))
+    return max(rule.steps, min(math.ceil(stretch / rule.inertia), rule.most * rule.steps))
 
 
 def sizes_of(scene: BlocksScene) -> list[Estimate]:

@@ -21,9 +21,7 @@ from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.stages.calibrate.state import State
 from graben.stages.calibrate.workers import Sent
 from graben.stages.shared.estimate import Estimate, work
-
-# starts, particles, generations, refined particles of each start, increments between two points
-FIDELITY = {"draft": (1, 24, 60, 3, 1), "standard": (4, 24, 100, 4, 2), "reference": (12, 48, 200, 6, 4)}
+from graben.stages.shared.fidelity import setting
 
 _POINT_BYTES = 200.0  # of one point of one particle: prediction and residuals
 _ELASTIC = ("young_modulus", "poisson_ratio")
@@ -188,8 +186,9 @@ def problem_of(scene: CalibrateScene, scene_path: Path, name: str, threads: int 
         middle = box.to_values(np.full(box.size, 0.5))
         point = np.array([m if v is None else v for v, m in zip(initial, middle)])
         guess = box.to_unit(point)[None]
-    _starts, _particles, _generations, _refined, increments = FIDELITY[scene.fidelity]
-    return Problem(name, scene, box, fixed, _priors(scene, box), plan, scene.increments or increments, guess, threads)
+    return Problem(
+        name, scene, box, fixed, _priors(scene, box), plan, setting(scene, "increments"), guess, threads
+    )  # fmt: skip
 
 
 def sizes_of(problem: Problem, rivals: int, curves: Sequence[Curve]) -> list[Estimate]:
@@ -210,18 +209,17 @@ def sizes_of(problem: Problem, rivals: int, curves: Sequence[Curve]) -> list[Est
 
 def plan_of(scene: CalibrateScene) -> Plan:
     """How hard the scene says to search."""
-    starts, particles, generations, refined, _increments = FIDELITY[scene.fidelity]
     s, r = scene.swarm, scene.refine
     return Plan(
-        starts=s.starts or starts,
-        particles=s.particles or particles,
-        generations=generations if s.generations is None else s.generations,
+        starts=setting(scene, "swarm.starts"),
+        particles=setting(scene, "swarm.particles"),
+        generations=setting(scene, "swarm.generations"),
         inertia=s.inertia,
         inertia_reduction=s.inertia_reduction,
         cognitive=s.cognitive,
         social=s.social,
         constriction=s.constriction,
-        refine_best=r.best or refined,
+        refine_best=setting(scene, "refine.best"),
         damping=r.damping,
         factor=r.factor,
         move_limit=r.move_limit,

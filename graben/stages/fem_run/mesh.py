@@ -15,6 +15,7 @@ from graben.mechanics.meshes.paved import paved_mesh
 from graben.mechanics.meshes.sizing import SizeField
 from graben.schemas.mesh_file import read_plane_mesh
 from graben.schemas.scenes.fem import FemScene
+from graben.stages.shared.fidelity import factor_of
 
 _log = logging.getLogger(__name__)
 
@@ -44,7 +45,7 @@ def mesh_of(scene: FemScene) -> tuple[QuadMesh, list[str]]:
 def size_field(scene: FemScene) -> SizeField:
     """Element sizes that the scene asks for, at its fidelity."""
     mesh = scene.mesh
-    factor = {"draft": mesh.draft_factor, "standard": 1.0, "reference": mesh.reference_factor}[scene.fidelity]
+    factor = factor_of(scene, "mesh.size")
     return SizeField(
         size=factor * mesh.size,
         segments=np.array([[r.start, r.end] for r in mesh.refine], dtype=float).reshape(-1, 2, 2),

@@ -28,12 +28,10 @@ from graben.schemas.outputs import LAST_GOOD, PARTIAL, SERIES, Outputs, beside
 from graben.schemas.scenes.particles import ParticlesScene
 from graben.schemas.vtk import vtu_series, write_vtu
 from graben.stages.shared.estimate import Estimate, refuse_too_large, work
+from graben.stages.shared.fidelity import setting
 from graben.stages.shared.last_good import keep_by, keeps_last_good, write_whole
 from graben.stages.shared.measures import Measure, warnings_of
 from graben.stages.shared.record import Progress, Record, silent
-
-# (time step over critical, kinetic energy at rest, unbalanced force ratio)
-FIDELITY = {"draft": (0.6, 1e-2, 5e-3), "standard": (0.4, 1e-3, 1e-3), "reference": (0.2, 1e-4, 1e-4)}
 
 _GRAIN_BYTES = 4000.0  # states, contacts and their histories
 
@@ -196,7 +194,6 @@ def _law(scene: ParticlesScene) -> LinearLaw:
 
 
 def _recipe(scene: ParticlesScene) -> BedRecipe:
-    safety, rest, balance = FIDELITY[scene.fidelity]
     numerics, loading = scene.numerics, scene.loading
     smallest = min(g.diameter for g in scene.grains)
     shakes, amplitude, frequency = 0, 0.0, 0.0
@@ -215,9 +212,9 @@ def _recipe(scene: ParticlesScene) -> BedRecipe:
         shakes=shakes,
         shake_amplitude=amplitude,
         shake_frequency=frequency,
-        safety=numerics.safety or safety,
-        rest=numerics.rest or rest,
-        balance=numerics.balance or balance,
+        safety=setting(scene, "numerics.safety"),
+        rest=setting(scene, "numerics.rest"),
+        balance=setting(scene, "numerics.balance"),
         ramp=loading.ramp,
         energy_limit=numerics.energy_limit,
         max_steps=numerics.max_steps,

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from graben.declared.knobs import values_at
 from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.fitting.curves import Curve, CurveFit, Weights
 from graben.mechanics.fitting.identifiability import identify
@@ -22,16 +23,6 @@ from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.rev_study import RevStudyScene
 from graben.stages.shared.record import Progress
 from graben.stages.shared.workers import compute
-
-# The one fit that all samples begin with.
-_FIRST = {
-    "draft": Plan(starts=1, particles=24, generations=60),
-    "standard": Plan(starts=2, particles=24, generations=100),
-    "reference": Plan(starts=4, particles=48, generations=200, refine_best=4),
-}
-# Then each sample refines the best sets of that one (how many, iterations). Nothing random takes part: a swarm of its
-# own for each sample ends in other basins that fit as well, and that would pass for scatter of the rock.
-_EACH = {"draft": (1, 20), "standard": (3, 40), "reference": (6, 80)}
 
 
 @dataclass(frozen=True)
@@ -117,7 +108,7 @@ def fit_samples(
     """
     box = _box(law)
     radii, centres = stress.shape[:2]
-    increments = law.increments or {"draft": 1, "standard": 2, "reference": 4}[scene.fidelity]
+    increments = law.increments or values_at("calibrate", scene.fidelity)["increments"]
     w = law.weights
 
     def task(r: int, c: int, runs: np.ndarray, plan: Plan, guesses: np.ndarray | None) -> FitTask:
@@ -128,16 +119,15 @@ def fit_samples(
         )  # fmt: skip
 
     progress(0.0, "the first fit, at the largest radius")
-    first = task(radii - 1, middle, groups[0], _FIRST[scene.fidelity], None)
+    first = task(radii - 1, middle, groups[0], first_plan(scene), None)
     fit, found = first.solve()
     best = found.best
     slopes, coarse = (jacobian(lambda u: fit.residuals(box.to_values(u)), best.x, step) for step in (1e-4, 2e-4))
     known = identify(
         best.x, best.residuals, slopes, groups=fit.groups, lag=first.lag, noise=coarse - slopes, floor=fit.floor
     )
-    sets, iterations = _EACH[scene.fidelity]
-    guesses = found.members[:sets]
-    each = Plan(starts=1, particles=len(guesses), generations=0, refine_best=len(guesses), iterations=iterations)
+    guesses = found.members[: values_at("rev-study", scene.fidelity)["calibration.each.best"]]
+    each = each_plan(scene, len(guesses))
     tasks = [task(r, c, runs, each, guesses) for r in range(radii) for c in range(centres) for runs in groups]
     results = compute(fit_sample, tasks, processes, lambda f: progress(0.1 + 0.9 * f, "calibrating"), cluster=cluster)
     shape = (radii, centres, len(groups))
@@ -149,6 +139,23 @@ def fit_samples(
         identifiable=np.asarray(known.identifiable, dtype=bool),
         box=box,
     )
+
+
+def first_plan(scene: RevStudyScene) -> Plan:
+    """The one fit that all samples begin with."""
+    own = values_at("rev-study", scene.fidelity)
+    names = {"starts": "starts", "particles": "particles", "generations": "generations", "best": "refine_best"}
+    return Plan(**{field: own[f"calibration.first.{name}"] for name, field in names.items()})
+
+
+def each_plan(scene: RevStudyScene, sets: int) -> Plan:
+    """Each sample refines so many best sets of the first fit.
+
+    Nothing random takes part: a swarm of its own for each sample ends in other basins that fit as well, and that
+    would pass for scatter of the rock.
+    """
+    iterations = values_at("rev-study", scene.fidelity)["calibration.each.iterations"]
+    return Plan(starts=1, particles=sets, generations=0, refine_best=sets, iterations=iterations)
 
 
 def _curve(stress: np.ndarray, strain: np.ndarray, name: str) -> Curve:

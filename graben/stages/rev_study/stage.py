@@ -28,13 +28,13 @@ from graben.schemas.scenes.rev_study import RevStudyScene
 from graben.stages.blocks.history import Run, read_run
 from graben.stages.rev_study.calibration import Fits, check_law, chosen_parameters, fit_samples
 from graben.stages.shared.estimate import Estimate, refuse_too_large
+from graben.stages.shared.fidelity import setting
 from graben.stages.shared.last_good import keeps_last_good, write_whole
 from graben.stages.shared.measures import Measure, warnings_of
 from graben.stages.shared.record import Progress, Record, silent
 from graben.stages.shared.workers import compute
 
 _SAMPLE_BYTES = 20_000.0  # curves of a hundred states
-RESAMPLES = {"draft": 500, "standard": 2000, "reference": 20_000}
 
 # One chunk of samples: the file, and its (radius, x, y); one result each: stress, strain, area, blocks.
 Chunk = tuple[Path, list[tuple[float, float, float]]]
@@ -54,7 +54,7 @@ def prepare(scene: RevStudyScene, runs: int = 1) -> tuple[CalibrateScene | None,
         check_law(scene, law)
     places = float(len(scene.samples.centres) or scene.samples.grid**2)
     samples = places * len(scene.samples.radii) * runs
-    draws = scene.tests.resamples or RESAMPLES[scene.fidelity]
+    draws = setting(scene, "tests.resamples")
     columns = runs if runs >= 3 else places * runs
     drawn = 16.0 * draws * columns * len(scene.samples.radii)
     sizes = [
@@ -109,7 +109,7 @@ def run(
         scene.tests.confidence,
         scene.tests.tolerance,
         scene.tests.variation,
-        scene.tests.resamples or RESAMPLES[scene.fidelity],
+        setting(scene, "tests.resamples"),
     )
     radii = np.asarray(scene.samples.radii)
     independent = independent_samples(centres[0], radii, len(groups))

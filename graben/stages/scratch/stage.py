@@ -18,6 +18,7 @@ from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.scratch import ScratchScene
 from graben.stages.scratch.output import measure_groove, write_last_good, write_run
 from graben.stages.shared.estimate import Estimate, refuse_too_large, work
+from graben.stages.shared.fidelity import factor_of
 from graben.stages.shared.last_good import keep_by, keeps_last_good
 from graben.stages.shared.material import pack_material
 from graben.stages.shared.measures import Measure, warnings_of
@@ -135,8 +136,7 @@ def _sizes(scene: ScratchScene) -> list[Estimate]:
 
 def mesh_size(scene: ScratchScene) -> float:
     """Edge under the path [m] at the scene's fidelity."""
-    factor = {"draft": scene.mesh.draft_factor, "standard": 1.0, "reference": scene.mesh.reference_factor}
-    return scene.mesh.size * factor[scene.fidelity]
+    return scene.mesh.size * factor_of(scene, "mesh.size")
 
 
 def mesh_of(scene: ScratchScene) -> HexMesh:
@@ -158,12 +158,11 @@ def mesh_of(scene: ScratchScene) -> HexMesh:
 def numerics_of(scene: ScratchScene) -> Numerics:
     """The run's numerics at the scene's fidelity."""
     n = scene.numerics
-    factor = {"draft": n.draft_speed_factor, "standard": 1.0, "reference": n.reference_speed_factor}[scene.fidelity]
     return Numerics(
         points=n.points,
-        indent_speed=factor * n.indent_speed,
-        slide_speed=factor * n.slide_speed,
-        lift_speed=factor * n.lift_speed,
+        indent_speed=factor_of(scene, "numerics.indent_speed") * n.indent_speed,
+        slide_speed=factor_of(scene, "numerics.slide_speed") * n.slide_speed,
+        lift_speed=factor_of(scene, "numerics.lift_speed") * n.lift_speed,
         safety=n.safety,
         floor=n.floor,
         mass_cap=n.mass_cap,

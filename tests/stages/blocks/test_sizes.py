@@ -2,12 +2,14 @@
 
 import pytest
 
+from graben.declared.knobs import values_at
 from graben.schemas.scene import load_scene
-from graben.stages.blocks.sizes import FIDELITY, steps_of
+from graben.stages.blocks.sizes import steps_of
 from tests.conftest import PIPELINES, command, settings
 
 GRANITE = PIPELINES / "upscaling/voronoi-granite.toml"
 DRAFT = ["fidelity=draft"]
+LEAST = values_at("blocks", "draft")["numerics.steps"].steps
 
 
 def steps(*overrides, blocks=420.0, scene=GRANITE):
@@ -20,8 +22,8 @@ def pressure(mpa):
 
 def test_steps_go_as_one_over_the_root_of_the_confinement():
     low, high = steps(pressure(0.1)), steps(pressure(0.4))
-    assert low == pytest.approx(2 * high, rel=1e-3) and high > FIDELITY["draft"]
-    assert steps(pressure(100)) == FIDELITY["draft"]
+    assert low == pytest.approx(2 * high, rel=1e-3) and high > LEAST
+    assert steps(pressure(100)) == LEAST
     course = 'loading.confining_course=[["0 s", "4 MPa"], ["50 s", "0.1 MPa"]]'
     assert steps(pressure(4), course) == low
 
@@ -30,16 +32,16 @@ def test_steps_go_with_strain_and_with_blocks_along_the_height():
     one = steps(pressure(0.1))
     assert steps(pressure(0.1), 'loading.speed="10 mm/s"') == pytest.approx(2 * one, rel=1e-3)
     assert steps(pressure(0.1), blocks=4 * 420.0) == pytest.approx(2 * one, rel=1e-3)
-    assert steps(pressure(0.1), 'loading.duration="1 s"') == FIDELITY["draft"]
+    assert steps(pressure(0.1), 'loading.duration="1 s"') == LEAST
 
 
 def test_a_scene_that_gives_its_steps_gets_them_and_a_programme_those_of_its_fidelity():
     assert steps(pressure(0.1), "numerics.steps=500") == 500
-    assert steps(scene=PIPELINES / "upscaling/slope-blocks.toml") == FIDELITY["draft"]
+    assert steps(scene=PIPELINES / "upscaling/slope-blocks.toml") == LEAST
 
 
 def test_without_any_confinement_to_speak_of_the_steps_stay_bounded():
-    assert steps('loading.confining_pressure="1 Pa"') == 20 * FIDELITY["draft"]
+    assert steps('loading.confining_pressure="1 Pa"') == 20 * LEAST
 
 
 @pytest.mark.verify

@@ -1,0 +1,66 @@
+"""Write docs/manual/fidelity.md from the declared knobs of accuracy: python docs/make_fidelity.py"""
+
+from __future__ import annotations
+
+from itertools import groupby
+from pathlib import Path
+
+from graben.declared.knobs import STAGES, Knob, Stage
+
+PAGE = Path(__file__).parent / "manual" / "fidelity.md"
+HEAD = """# Fidelity
+
+`fidelity` in a scene is `draft`, `standard` (unless given) or `reference`. Use draft to try a scene
+out, standard for numbers, reference to check them. It chooses the knobs below, as far as the scene
+leaves them out. This page is made by [make_fidelity.py](../make_fidelity.py).
+
+- "times 2.7": the value in the scene is multiplied by this. Another factor may be given, for
+  instance as `mesh.draft_factor`.
+- "12500 or more": a compression of blocks at low confinement takes more steps, so that inertia
+  stays small ([theory](../theory/blocks.md#loading)).
+- "no key": the fidelity alone decides.
+
+homogenize and wear-estimate have no knob of accuracy.
+"""
+NOTES = {
+    "particles": "A bed costs 1, 3 and 11 at draft, standard and reference ([study](../studies/beds.md)).",
+    "blocks": "Draft blocks are still too strong ([study](../studies/blocks-fidelity.md)).",
+    "scratch": "A scratch costs 1, 10 and about 60 ([study](../studies/scratch.md)).",
+}
+
+
+def page() -> str:
+    """The text of docs/manual/fidelity.md."""
+    parts = [HEAD]
+    for stage in STAGES:
+        title = stage.command if stage.kind in ("fem", stage.command) else f"{stage.command}, {stage.kind}"
+        parts.append(f"## {title}\n")
+        if stage.kind in NOTES:
+            parts.append(NOTES[stage.kind] + "\n")
+        parts.append("\n".join(table(stage)) + "\n")
+    return "\n".join(parts)
+
+
+def table(stage: Stage) -> list[str]:
+    """Lines of a stage's table: first what fidelity turns, then what stays."""
+    lines = ["| key | what it is | draft | standard | reference |", "|---|---|---|---|---|"]
+    for steady, knobs in groupby(sorted(stage.knobs, key=lambda k: k.steady), lambda k: k.steady):
+        lines += [row(k, steady) for k in knobs]
+    return lines
+
+
+def row(k: Knob, steady: bool) -> str:
+    """One knob."""
+    name = f"`{k.key}`" if k.settable else "no key"
+    unit = "" if k.unit == "1" or not steady else f" {k.unit}"
+    values = [shown(v) + unit for v in (k.draft, k.standard, k.reference)]
+    return "| " + " | ".join([name, k.trades, *values]) + " |"
+
+
+def shown(value: object) -> str:
+    """A value, or a rule in words."""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
