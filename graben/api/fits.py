@@ -49,7 +49,7 @@ def fit(
     fixed: Mapping[str, Any] | None = None,
     *,
     test: str = "plane-strain",
-    length: float | str = "1 m",
+    length: float | str | None = None,
     fidelity: str = "standard",
     seed: int = 0,
     progress: Callable[[float, str], None] | None = None,
@@ -67,7 +67,7 @@ def fit(
         "log") and prior, as in a scene. Numbers in SI, or text with a unit
     fixed : the other parameters
     test : "plane-strain" or "triaxial"
-    length : characteristic length that the curves stand for, in m, for laws with damage
+    length : characteristic length that the curves stand for, in m, for laws with damage; 10 m unless given
     fidelity : "draft", "standard" or "reference"
     seed : of the search; the same seed gives the same numbers
     progress : called with the fraction done, 0 to 1, and a few words
@@ -84,11 +84,13 @@ def fit(
     from graben.stages.shared.record import silent
 
     bounds = {name: _bounds(law, name, given) for name, given in free.items()}
-    tables = {
+    tables: dict[str, Any] = {
         "kind": "calibrate", "law": law, "free": bounds, "test": test, "fidelity": fidelity, "seed": seed,
         "fixed": {name: parameter(law, name, value) for name, value in (fixed or {}).items()},
-        "length": length if isinstance(length, str) else f"{float(length)!r} m", **settings,
+        **settings,
     }  # fmt: skip
+    if length is not None:
+        tables["length"] = length if isinstance(length, str) else f"{float(length)!r} m"
     model = scene(tables)
     named = curves if isinstance(curves, Mapping) else {f"curve {k + 1}": c for k, c in enumerate(curves)}
     if not named:

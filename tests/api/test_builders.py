@@ -90,7 +90,7 @@ def test_a_law_from_outside_is_calibrated_from_arrays_and_by_the_stage(tmp_path)
     columns = np.column_stack([test.strain[:, 1], test.stress[:, 1], test.strain[:, 0], test.stress[:, 0]])
     np.savetxt(path, columns, delimiter=",", header="strain_yy,stress_yy_pa,strain_xx,stress_xx_pa", comments="")
     tables = {
-        "kind": "calibrate", "law": "voce test", "seed": 2, "fidelity": "draft", "length": "1 m", **QUICK,
+        "kind": "calibrate", "law": "voce test", "seed": 2, "fidelity": "draft", **QUICK,
         "fixed": {"poisson_ratio": 0.3, "young_modulus": "200 GPa"},
         "free": {"initial_yield": {"lower": "100 MPa", "upper": "600 MPa"}, "rate": {"lower": 2.0, "upper": 80.0},
                  "gain": {"lower": "50 MPa", "upper": "800 MPa"}},

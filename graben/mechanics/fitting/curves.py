@@ -69,7 +69,7 @@ class Weights:
 
     normalise: str = "curve"
     last: float = 0.5
-    strain: float = 0.5
+    strain: float = 0.05
     penalty: float = 2.0
 
 

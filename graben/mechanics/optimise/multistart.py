@@ -31,7 +31,7 @@ class Plan:
     `levenberg_marquardt`.
     """
 
-    starts: int = 3
+    starts: int = 4
     particles: int = 24
     generations: int = 100
     inertia: float = 0.73
@@ -39,7 +39,7 @@ class Plan:
     cognitive: float = 1.5
     social: float = 1.5
     constriction: float = 1.0
-    refine_best: int = 3
+    refine_best: int = 4
     damping: float = 1e-2
     factor: float = 4.0
     move_limit: float = 0.1

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal
 
 from pydantic import model_validator
 
-from graben.schemas.quantities import Angle, Density, Integer, JointStiffness, Length, Number, Pressure, Switch, key
+from graben.schemas.quantities import (
+    Angle,
+    Density,
+    Integer,
+    JointStiffness,
+    Length,
+    Number,
+    Pressure,
+    Switch,
+    key,
+    to_si,
+)
 from graben.schemas.scene import InputFile, Model, Scene
 from graben.schemas.scenes.blocks_loading import InSitu, Loading, Numerics, Point, Programme
 
@@ -81,6 +91,10 @@ class Tessellation(Model):
     zone_edge: Length | None = key(None, "longest zone edge; left out: zones span the block corners only", gt=0)
 
 
+_GRANITE = {"friction": "51 deg", "cohesion": "55.1 MPa", "tension": "11.7 MPa", "dilation": "0 deg"}
+"""Y's granite in UDEC."""
+
+
 class Rock(Model):
     """The blocks themselves, in plane strain; strengths left out are those of Y's granite in UDEC."""
 
@@ -91,20 +105,24 @@ class Rock(Model):
     young: Pressure = key("65 GPa", "Young's modulus (rigid blocks have none)", gt=0)
     poisson: Number = key(0.2, "Poisson's ratio (rigid blocks have none)", ge=-0.99, le=0.49999)
     density: Density = key("2700 kg/m^3", "density", gt=0)
-    friction: Angle | None = key(None, "mohr-coulomb: friction angle; left out: 51 deg", ge=0, le=1.396)
-    cohesion: Pressure | None = key(None, "mohr-coulomb: cohesion; left out: 55.1 MPa", ge=0)
+    friction: Angle | None = key(
+        None, f"mohr-coulomb: friction angle; left out: {_GRANITE['friction']}", ge=0, le=1.396
+    )
+    cohesion: Pressure | None = key(None, f"mohr-coulomb: cohesion; left out: {_GRANITE['cohesion']}", ge=0)
     tension: Pressure | None = key(
-        None, "mohr-coulomb: tensile strength, cut at the cone's apex; left out: 11.7 MPa", ge=0
+        None, f"mohr-coulomb: tensile strength, cut at the cone's apex; left out: {_GRANITE['tension']}", ge=0
     )
     dilation: Angle | None = key(
-        None, "mohr-coulomb: dilation angle, at most friction; left out: 0 deg", ge=0, le=1.396
+        None, f"mohr-coulomb: dilation angle, at most friction; left out: {_GRANITE['dilation']}", ge=0, le=1.396
     )
 
     @property
     def strength(self) -> tuple[float, float, float, float]:
         """Friction [rad], cohesion, tension [Pa], dilation [rad]."""
         given = (self.friction, self.cohesion, self.tension, self.dilation)
-        left_out = (math.radians(51.0), 55.1e6, 11.7e6, 0.0)
+        left_out = (
+            to_si(text, unit) for text, unit in zip(_GRANITE.values(), ("rad", "Pa", "Pa", "rad"), strict=True)
+        )
         friction, cohesion, tension, dilation = (d if g is None else g for g, d in zip(given, left_out, strict=True))
         return friction, cohesion, tension, dilation
 
@@ -119,6 +137,9 @@ class Rock(Model):
         return self
 
 
+_SLOPE = {"ge": 0, "lt": 1.57}  # angles of joints: their tangents are finite
+
+
 class JointsOfSet(Model):
     """Joints of one set that differ from the others; what is left out is as in [joints]."""
 
@@ -127,12 +148,12 @@ class JointsOfSet(Model):
     )
     normal_stiffness: JointStiffness | None = key(None, "normal stiffness", gt=0)
     shear_stiffness: JointStiffness | None = key(None, "shear stiffness", gt=0)
-    friction: Angle | None = key(None, "friction angle", ge=0, lt=1.57)
+    friction: Angle | None = key(None, "friction angle", **_SLOPE)
     cohesion: Pressure | None = key(None, "cohesion", ge=0)
     tension: Pressure | None = key(None, "tensile strength", ge=0)
-    dilation: Angle | None = key(None, "dilation angle", ge=0, lt=1.57)
+    dilation: Angle | None = key(None, "dilation angle", **_SLOPE)
     dilation_limit: Length | None = key(None, "net slip at which dilation stops", gt=0)
-    residual_friction: Angle | None = key(None, "friction once a joint has broken", ge=0, lt=1.57)
+    residual_friction: Angle | None = key(None, "friction once a joint has broken", **_SLOPE)
     residual_cohesion: Pressure | None = key(None, "cohesion once a joint has broken", ge=0)
     closure: Length | None = key(None, "largest closure of joints that stiffen", gt=0)
 
@@ -142,13 +163,13 @@ class Joints(Model):
 
     normal_stiffness: JointStiffness = key("10 GPa/m", "normal stiffness", gt=0)
     shear_stiffness: JointStiffness = key("1 GPa/m", "shear stiffness", gt=0)
-    friction: Angle = key("32 deg", "friction angle", ge=0, lt=1.57)
+    friction: Angle = key("32 deg", "friction angle", **_SLOPE)
     cohesion: Pressure = key("100 kPa", "cohesion, kept while sliding", ge=0)
     tension: Pressure = key("0 Pa", "tensile strength, lost once broken", ge=0)
-    dilation: Angle = key("5 deg", "dilation angle", ge=0, lt=1.57)
+    dilation: Angle = key("5 deg", "dilation angle", **_SLOPE)
     dilation_limit: Length | None = key(None, "net slip at which dilation stops; left out: never", gt=0)
     residual_friction: Angle | None = key(
-        None, "friction once a joint has broken, by slip or in tension; left out: as before", ge=0, lt=1.57
+        None, "friction once a joint has broken, by slip or in tension; left out: as before", **_SLOPE
     )
     residual_cohesion: Pressure | None = key(None, "cohesion once a joint has broken; left out: as before", ge=0)
     closure: Length | None = key(
