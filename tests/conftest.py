@@ -2,6 +2,7 @@
 
 import logging
 import signal
+from contextlib import contextmanager
 from pathlib import Path
 
 import hypothesis
@@ -28,9 +29,9 @@ SMALL_BLOCKS = [
 SMALL_BED = ["fidelity=draft", 'box.width="0.6 mm"', 'box.depth="0.3 mm"']
 
 
-@pytest.fixture
-def laws_as_before():
-    """Laws from outside that a test makes known are forgotten after it."""
+@contextmanager
+def laws_forgotten():
+    """Laws from outside that are made known within are forgotten after it."""
     from graben.declared.laws import PARAMETERS
     from graben.mechanics.materials.laws import LAWS
 
@@ -39,6 +40,13 @@ def laws_as_before():
     for known, before in former:
         known.clear()
         known.update(before)
+
+
+@pytest.fixture
+def laws_as_before():
+    """Laws from outside that a test makes known are forgotten after it."""
+    with laws_forgotten():
+        yield
 
 
 def command(*arguments):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from graben.api.materials import Material
 from graben.api.materials import material as material_of
 from graben.api.scenes import scene
-from graben.api.units import parameter
+from graben.api.units import known, parameter
 from graben.errors import BadInput, Fault
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ def fit(
     curves : by name, or a sequence: pairs of stress and strain, (steps, 4) each, components xx, yy, zz, xy, in Pa and
         with tensor shear, tension positive; or anything with such ``stress`` and ``strain``, as `follow` and
         `average` give. Axial is yy, lateral xx
-    law : name of a law
+    law : name of a law, "module:law" for one of one's own that a module defines
     free : bounds of each parameter to find, (lower, upper), or a table of lower, upper, initial, scale ("linear" or
         "log") and prior, as in a scene. Numbers in SI, or text with a unit
     fixed : the other parameters
@@ -83,6 +83,7 @@ def fit(
     from graben.stages.calibrate.workers import workers_of
     from graben.stages.shared.record import silent
 
+    known(law, "law")
     bounds = {name: _bounds(law, name, given) for name, given in free.items()}
     tables: dict[str, Any] = {
         "kind": "calibrate", "law": law, "free": bounds, "test": test, "fidelity": fidelity, "seed": seed,

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from graben.api.units import known
 from graben.declared.laws import parameter
 from graben.declared.parameter import Parameter
 from graben.errors import BadInput, Fault, Refused
@@ -67,7 +68,8 @@ def material(law: str | Path, **parameters: Any) -> Material:
 
     Parameters
     ----------
-    law : name of a law, see docs/manual/materials.md or `laws`; or a NAME.material.toml, or calibrate's artifact
+    law : name of a law, see docs/manual/materials.md or `laws`, "module:law" for one of one's own that a module
+        defines; or a NAME.material.toml, or calibrate's artifact
     parameters : numbers in SI, or text with a unit ("65 GPa"); words; tables of rows. They replace those of a file
 
     Raises
@@ -78,6 +80,7 @@ def material(law: str | Path, **parameters: Any) -> Material:
     name = str(law)
     if name not in LAWS and (isinstance(law, Path) or name.endswith((".toml", ".nc"))):
         name, values = read_material(law)
+    known(name, "law")
     faults = []
     for key, value in parameters.items():
         try:
@@ -233,7 +236,8 @@ def law(
     """Make a constitutive law of one's own known in this process, by decorating its function.
 
     ``material``, ``follow``, ``fit``, ``plane_analysis`` and scenes of kinds "fem" and "calibrate" then take it by
-    its name. The function is compiled by numba, plain or already decorated with ``numba.njit``::
+    its name. As "module:name" every process finds it: commands, files of scenes and materials, workers. The
+    function is compiled by numba, plain or already decorated with ``numba.njit``::
 
         function(deps, sig, state, par, length)            # or (..., length, tangent)
 
@@ -249,7 +253,7 @@ def law(
 
     Parameters
     ----------
-    name : a name that no law of the package has; an earlier law of one's own is replaced
+    name : one without a colon that no law of the package has; an earlier law of one's own is replaced
     parameters : ``Parameter(name, unit, lower, upper, default)``, numbers with SI units that scenes know
     state : names, or initial values by name. ``equivalent_plastic_strain`` and ``damage`` are drawn by fem-run
     isotropic : whether the law knows no direction
@@ -267,7 +271,9 @@ def law(
             for p in parameters:
                 if p.unit not in ("1", *KNOWN):
                     raise Refused(f"{p.name} in one of the units 1, {', '.join(KNOWN)}, not {p.unit!r}")
-            register(make_law(name, function, tuple(parameters), initial, isotropic, words))
+            if ":" in name:
+                raise Refused("a name without a colon")
+            register(make_law(name, function, tuple(parameters), initial, isotropic, words), function.__module__)
         except Refused as error:
             raise BadInput(Fault("law", name, "", str(error), True)) from error
         return function

@@ -47,6 +47,14 @@ def _with_units(schema: dict[str, Any], value: Any, defs: dict[str, Any]) -> Any
     return value
 
 
+def known(law: str, argument: str) -> None:
+    """Find the law of that name, in the module that it names where it does; BadInput where there is none."""
+    try:
+        laws.parameters_of(law)
+    except Refused as error:
+        raise BadInput(Fault("", argument, repr(law), str(error), True)) from error
+
+
 def parameter(law: str, name: str, value: Any) -> Any:
     """A law's parameter as scenes take it: numbers get their unit, tables row by row."""
     p = laws.parameter(law, name)

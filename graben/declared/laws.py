@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from importlib import import_module
 
 from graben.declared.parameter import Parameter
 from graben.errors import Refused
@@ -198,6 +199,21 @@ def declare(law: str, parameters: Sequence[Parameter]) -> None:
     if law in _OURS:
         raise Refused(f"another name: {law!r} is a law of the package")
     PARAMETERS[law] = tuple(parameters)
+
+
+def parameters_of(law: str) -> tuple[Parameter, ...]:
+    """The parameters of the law of that name; Refused says which there are.
+
+    For "module:law" that module is imported first, whose `graben.law` declares it: so every process finds it.
+    """
+    if law not in PARAMETERS and ":" in law:
+        try:
+            import_module(law.partition(":")[0])
+        except Exception as error:  # whatever a user's module raises
+            raise Refused(f"a law of a module that can be imported ({error})") from error
+    if law not in PARAMETERS:
+        raise Refused(f"one of {', '.join(PARAMETERS)}, or module:law for a law of one's own")
+    return PARAMETERS[law]
 
 
 def parameter(law: str, name: str) -> Parameter | None:

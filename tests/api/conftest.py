@@ -12,6 +12,8 @@ from tests.api.laws import VOCE, voce
 def voce_law():
     """The record of "voce test" and its parameters: compiled once."""
     graben.law("voce test", VOCE, ["equivalent_plastic_strain"])(voce)
+    for known in (LAWS, PARAMETERS):
+        del known["tests.api.laws:voce test"]
     return LAWS.pop("voce test"), PARAMETERS.pop("voce test")
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import graben
-from tests.api.laws import STEEL
 
 SQUARE = [{"start": (0, 0), "end": (1, 0), "fix": "y"}, {"start": (0, 0), "end": (0, 1), "fix": "x"}]
 TOP = {"name": "top", "start": (0.0, 1.0), "end": (1.0, 1.0)}
@@ -53,52 +52,6 @@ def test_arrays_are_those_of_the_stage(tmp_path):
     data = there.open()
     for name in ("displacement", "stress", "strain", "reaction", "step_settlement"):
         np.testing.assert_array_equal(getattr(here, name), data[name].values)
-
-
-@pytest.mark.usefixtures("foreign_laws")
-def test_a_law_from_outside_carries_a_body_to_its_limit_load():
-    """A strip under a rising pressure in uniaxial stress yields where Voce's curve saturates."""
-    steel = graben.material("voce test", **{**STEEL, "rate": 2000.0})
-    mesh = graben.mesh.rectangle(1.0, 1.0, 0.5)
-    loads = [{**TOP, "rate": 1e8}]
-    found = graben.plane_analysis(
-        mesh, steel, SQUARE, loads, stepping={"end": 9, "first": 0.5, "largest": 0.5, "smallest": 1e-3}
-    )
-    # plane strain of a von Mises body: 2 / sqrt(3) of the uniaxial strength, from 300 + 200 MPa
-    assert found.headline["failed"]
-    assert found.headline["failure_load_pa"] == pytest.approx(5e8 * 2 / np.sqrt(3.0), rel=0.02)
-    assert found.plastic_strain[-1].min() > 1e-3 and (found.damage == 0.0).all()
-    scene = {"kind": "fem", "material": dict(steel)}
-    assert graben.check(scene) == [] and graben.scene(scene).material.law == "voce test"
-
-
-@pytest.mark.usefixtures("foreign_laws")
-def test_a_law_from_outside_is_calibrated_from_arrays_and_by_the_stage(tmp_path):
-    truth = graben.material("voce test", **STEEL)
-    strain = np.concatenate([np.linspace(0.0, -0.003, 7), np.linspace(-0.005, -0.05, 12)])
-    test = graben.follow(truth, strain, mode="plane-strain")
-    fixed = {"poisson_ratio": 0.3, "young_modulus": 200e9}
-    free = {"initial_yield": (1e8, "600 MPa"), "gain": {"lower": 5e7, "upper": 8e8}, "rate": (2.0, 80.0)}
-    found = graben.fit({"press": test}, "voce test", free, fixed, fidelity="draft", seed=2, **QUICK)
-    for name, true in (("initial_yield", 3e8), ("gain", 2e8), ("rate", 20.0)):
-        assert found.parameters[name] == pytest.approx(true, rel=1e-3), name
-    assert found.material.law == "voce test" and found.material.parameters["young_modulus"] == 200e9
-    assert found.stress["press"].shape == test.stress.shape and found.rmse < 1e4
-    np.testing.assert_allclose(found.stress["press"][:, 1], test.stress[:, 1], atol=1e5)
-
-    path = tmp_path / "press.csv"
-    columns = np.column_stack([test.strain[:, 1], test.stress[:, 1], test.strain[:, 0], test.stress[:, 0]])
-    np.savetxt(path, columns, delimiter=",", header="strain_yy,stress_yy_pa,strain_xx,stress_xx_pa", comments="")
-    tables = {
-        "kind": "calibrate", "law": "voce test", "seed": 2, "fidelity": "draft", **QUICK,
-        "fixed": {"poisson_ratio": 0.3, "young_modulus": "200 GPa"},
-        "free": {"initial_yield": {"lower": "100 MPa", "upper": "600 MPa"}, "rate": {"lower": 2.0, "upper": 80.0},
-                 "gain": {"lower": "50 MPa", "upper": "800 MPa"}},
-    }  # fmt: skip
-    result = graben.run(tables, tmp_path / "fit.nc", curves=[path])
-    assert result["parameters"]["rate"] == pytest.approx(20.0, rel=1e-3)
-    again = graben.material(tmp_path / "fit.material.toml")
-    assert again == graben.material(result.output) and again.law == "voce test"
 
 
 def test_curves_that_cannot_be_fitted_are_refused():

@@ -28,8 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graben.declared.laws import declare
-from graben.errors import Refused
+from graben.declared.laws import declare, parameters_of
 from graben.mechanics.compiled import kernel
 from graben.mechanics.materials.drucker_prager import (
     DRUCKER_PRAGER,
@@ -103,19 +102,19 @@ def isotropic(law_id):
     return law_id >= 0 and law_id != 6
 
 
-def register(record: Law) -> None:
-    """Make a law from outside known by its name in this process; one of that name from outside is replaced.
+def register(record: Law, module: str) -> None:
+    """Make a law from outside known in this process, by its name and as "module:name"; an earlier one is replaced.
 
     Refused for the name of a law of the package.
     """
-    declare(record.name, record.parameters)
-    LAWS[record.name] = record
+    for name in (record.name, f"{module}:{record.name}"):
+        declare(name, record.parameters)
+        LAWS[name] = record
 
 
 def find(name: str) -> Law:
-    """The law of that name; Refused lists the known ones."""
-    if name not in LAWS:
-        raise Refused(f"no law {name!r}; known: {', '.join(sorted(LAWS))}")
+    """The law of that name, or of "module:law"; Refused lists the known ones."""
+    parameters_of(name)
     return LAWS[name]
 
 

@@ -7,7 +7,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from graben.declared.laws import PARAMETERS, parameter
+from graben.declared.laws import PARAMETERS, parameter, parameters_of
 from graben.errors import Refused
 from graben.schemas.quantities import Integer, Length, Number, Switch, key, knob_key
 from graben.schemas.scene import InputFile, Model, Scene
@@ -121,7 +121,7 @@ class CalibrateScene(Scene):
         "plane-strain",
         "axial (yy) strain and lateral (xx) stress are prescribed; zz: no strain, or the lateral stress",
     )
-    law: str = key("drucker-prager", "constitutive law: " + ", ".join(PARAMETERS))
+    law: str = key("drucker-prager", "constitutive law: " + ", ".join(PARAMETERS) + ", or module:law")
     fixed: dict[str, Any] = Field(
         {"hardening": "exponential", "damage": "ductile"},
         description="parameters that are given: quantities with units, bare numbers, words, tables",
@@ -150,8 +150,10 @@ class CalibrateScene(Scene):
 
     @model_validator(mode="after")
     def _parameters(self) -> Self:
-        if self.law not in PARAMETERS:
-            raise ValueError(f"law = {self.law!r}: expected one of {', '.join(PARAMETERS)}")
+        try:
+            parameters_of(self.law)
+        except Refused as error:
+            raise ValueError(f"law = {self.law!r}: expected {error}") from error
         faults = []
         for name, value in self.fixed.items():
             try:

@@ -17,7 +17,7 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
-from graben.declared.laws import PARAMETERS, parameter
+from graben.declared.laws import PARAMETERS, parameter, parameters_of
 from graben.errors import BadInput, Fault, Refused
 from graben.schemas.files import whole_file
 from graben.schemas.quantities import key, plain_number, to_si
@@ -68,8 +68,10 @@ def _number(value: Any) -> float:
 
 def _convert(law: Any, parameters: Any) -> tuple[dict[str, Any], list[tuple[str, Any, str]]]:
     """Values in SI, and every fault as (key, value, expected)."""
-    if law not in PARAMETERS:
-        return {}, [("law", law, "one of " + ", ".join(PARAMETERS))]
+    try:
+        parameters_of(str(law))
+    except Refused as error:
+        return {}, [("law", law, str(error))]
     if not isinstance(parameters, Mapping):
         return {}, [("parameters", parameters, "a table of parameters")]
     values: dict[str, Any] = {}
@@ -86,7 +88,7 @@ class MaterialTable(Model):
     """Either `file`, or `law` and `parameters`."""
 
     file: InputFile | None = key(None, "a NAME.material.toml, or calibrate's artifact, instead of law and parameters")
-    law: str | None = key(None, "name of the law: " + ", ".join(PARAMETERS))
+    law: str | None = key(None, "name of the law: " + ", ".join(PARAMETERS) + ", or module:law")
     parameters: dict[str, Any] = key({}, "the law's parameters: quantities with units, bare numbers, words, tables")
 
     @model_validator(mode="after")

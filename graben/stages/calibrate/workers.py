@@ -14,6 +14,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from graben.errors import BadInput, Fault, Refused
 from graben.stages.shared.workers import PATIENCE_S, await_worker, connect, worker_processes
 
 Array = NDArray[np.float64]
@@ -40,7 +41,10 @@ class Sent:
 
 @lru_cache(maxsize=8)
 def _unpacked(packed: bytes) -> Callable[[Array], Array]:
-    function: Callable[[Array], Array] = pickle.loads(zlib.decompress(packed))
+    try:
+        function: Callable[[Array], Array] = pickle.loads(zlib.decompress(packed))
+    except Refused as error:
+        raise BadInput(Fault("", "law", "", f"a law that worker processes find: {error}")) from error
     return function
 
 

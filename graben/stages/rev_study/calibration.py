@@ -21,6 +21,7 @@ from graben.mechanics.optimise.multistart import Found, Plan, search
 from graben.mechanics.optimise.space import Box
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.rev_study import RevStudyScene
+from graben.stages.shared.material import find_law
 from graben.stages.shared.record import Progress
 from graben.stages.shared.workers import compute
 
@@ -76,6 +77,7 @@ class Fits:
 
 def fit_sample(task: FitTask) -> tuple[np.ndarray, float]:
     """Parameters (k,) in SI and RMSE of the axial stress in Pa; runs in a worker process."""
+    find_law(task.law)
     fit, found = task.solve()
     values = task.box.to_values(found.best.x)
     return values, float(fit.errors(values)["stress"])

@@ -9,19 +9,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from graben.errors import BadInput, Fault
+from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.materials.law import Law
-from graben.mechanics.materials.laws import LAWS
+from graben.mechanics.materials.laws import find
 from graben.schemas.scenes.material import MaterialTable, read_material
+
+
+def find_law(law: str, file: str | Path = "") -> Law:
+    """The record of a law by its name; BadInput, in words of that file, where this process knows none."""
+    try:
+        return find(law)
+    except Refused as error:
+        raise BadInput(Fault(str(file), "law", repr(law), str(error))) from error
 
 
 def pack_values(
     law: str, values: Mapping[str, Any], file: str | Path, prefix: str = "parameters."
 ) -> tuple[Law, NDArray[np.float64]]:
     """The law's record and its packed parameters; BadInput that names file and key for every fault."""
-    if law not in LAWS:
-        raise BadInput(Fault(str(file), "law", repr(law), "one of " + ", ".join(sorted(LAWS))))
-    record = LAWS[law]
+    record = find_law(law, file)
     faults = [
         Fault(str(file), prefix + name, repr(values[name]) if name in values else "", text)
         for name, text in record.faults(values)

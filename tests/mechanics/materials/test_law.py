@@ -61,5 +61,5 @@ def test_tables_that_make_no_sense_are_refused(table):
 
 def test_laws_have_distinct_ids_and_states_that_match_their_names():
     assert len({law.id for law in LAWS.values()}) == len(LAWS)
-    with pytest.raises(ValueError, match=r"known: .*elastic"):
+    with pytest.raises(ValueError, match=r"one of .*elastic.* or module:law"):
         find("granite")
