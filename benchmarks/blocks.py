@@ -15,14 +15,14 @@ import time
 
 import numpy as np
 
-from graben.mechanics.blocks import relaxation as rx
-from graben.mechanics.blocks.bodies import build_bodies
-from graben.mechanics.blocks.compression import consolidate
-from graben.mechanics.blocks.joints import Joint
-from graben.mechanics.blocks.model import BlockModel
-from graben.mechanics.blocks.plastic_zones import ELASTIC, PlasticZones, Strength
-from graben.mechanics.blocks.tessellation import voronoi_blocks
-from graben.mechanics.blocks.watch import AWAY, CLOSED
+from graben.mechanics.blocks.contact.joints import Joint
+from graben.mechanics.blocks.contact.sleeping import AWAY, CLOSED
+from graben.mechanics.blocks.engine import relaxation as rx
+from graben.mechanics.blocks.engine.model import BlockModel
+from graben.mechanics.blocks.loading.compression import consolidate
+from graben.mechanics.blocks.shape.bodies import build_bodies
+from graben.mechanics.blocks.shape.tessellation import voronoi_blocks
+from graben.mechanics.blocks.zones.plastic import ELASTIC, PlasticZones, Strength
 
 PLAIN = Joint(1e10, 1e9, np.tan(np.radians(32)), 1e5, 0.0, 0.0, np.inf)
 FEATURES = {

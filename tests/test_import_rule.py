@@ -19,6 +19,8 @@ ALLOWED = {
 # What mechanics may use beside itself and the standard library (cmaes is optional, imported where it is used).
 MECHANICS_LIBRARIES = {"numpy", "scipy", "numba", "llvmlite", "cmaes", "shapely"}
 STRANGERS = {"blocks", "particles", "averaging", "wear"}
+# Folders of the block model; each imports only those before it.
+BLOCKS = ("shape", "contact", "zones", "engine", "record", "loading")
 
 
 def imported(path: Path) -> set[str]:
@@ -69,6 +71,15 @@ def test_rooms_of_mechanics_do_not_import_one_another(room):
             parts = name.split(".")
             if parts[:2] == ["graben", "mechanics"] and len(parts) > 2:
                 assert parts[2] not in STRANGERS - {room}, f"{path} imports {name}"
+
+
+def test_the_block_model_is_built_from_the_ground_up():
+    for k, room in enumerate(BLOCKS):
+        for path in files(f"mechanics/blocks/{room}"):
+            for name in imported(path):
+                parts = name.split(".")
+                if parts[:3] == ["graben", "mechanics", "blocks"] and len(parts) > 3:
+                    assert parts[3] in BLOCKS[: k + 1], f"{path} imports {name}"
 
 
 def test_commands_import_nothing_heavy_until_they_run():

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from graben.api.scenes import scene as checked
 from graben.api.units import si
 from graben.errors import BadInput, Fault, Refused
-from graben.mechanics.blocks.model import BlockModel
-from graben.mechanics.blocks.tessellation import Tessellation
-from graben.mechanics.blocks.tessellation import voronoi_blocks as tessellate
+from graben.mechanics.blocks.engine.model import BlockModel
+from graben.mechanics.blocks.shape.tessellation import Tessellation
+from graben.mechanics.blocks.shape.tessellation import voronoi_blocks as tessellate
 from graben.mechanics.particles.bed import Bed
 from graben.schemas.scene import Given
 

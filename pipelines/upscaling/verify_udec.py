@@ -32,15 +32,10 @@ UNITS = {"peak_pa": ("MPa", 1e6), "strain_at_peak": ("%", 0.01), "modulus_pa": (
 
 def fingerprint(scene: Path, fidelity: str) -> str:
     """A name for what decides the curves: the scene and the sources of the block model and of the averages."""
-    package = HERE.parents[1] / "graben"
-    files = [
-        *package.rglob("mechanics/blocks/*.py"),
-        *package.rglob("mechanics/averaging/*.py"),
-        *package.rglob("mechanics/plane/*.py"),
-        scene,
-    ]
+    mechanics = HERE.parents[1] / "graben" / "mechanics"
+    files = [file for room in ("blocks", "averaging", "plane") for file in (mechanics / room).rglob("*.py")]
     digest = hashlib.sha256(fidelity.encode())
-    for file in sorted(files):
+    for file in [*sorted(files), scene]:
         digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
 

@@ -7,10 +7,10 @@ from graben.mechanics.averaging.network import build_network
 from graben.mechanics.averaging.outline import find_outline
 from graben.mechanics.averaging.rev import Circle
 from graben.mechanics.averaging.strain import outline_gradient
-from graben.mechanics.blocks.bodies import Bodies, build_bodies
-from graben.mechanics.blocks.joints import Joint
-from graben.mechanics.blocks.model import BlockModel, Damping
-from graben.mechanics.blocks.tessellation import from_polygons, voronoi_blocks
+from graben.mechanics.blocks.contact.joints import Joint
+from graben.mechanics.blocks.engine.model import BlockModel, Damping
+from graben.mechanics.blocks.shape.bodies import Bodies, build_bodies
+from graben.mechanics.blocks.shape.tessellation import from_polygons, voronoi_blocks
 
 E, NU, RHO = 65e9, 0.2, 2700.0
 GLUED = Joint(1e12, 1e12, 0.0, 1e12, 1e12, 0.0, np.inf)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from graben.mechanics.blocks.bodies import build_bodies
-from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets
-from graben.mechanics.blocks.joints import Joint
-from graben.mechanics.blocks.mending import mend
-from graben.mechanics.blocks.model import BlockModel, Damping
-from graben.mechanics.blocks.programme import pressure_forces
-from graben.mechanics.blocks.tessellation import from_polygons, voronoi_blocks
+from graben.mechanics.blocks.contact.joints import Joint
+from graben.mechanics.blocks.engine.model import BlockModel, Damping
+from graben.mechanics.blocks.loading.programme import pressure_forces
+from graben.mechanics.blocks.shape.bodies import build_bodies
+from graben.mechanics.blocks.shape.joint_sets import JointSet, cut_by_sets
+from graben.mechanics.blocks.shape.mending import mend
+from graben.mechanics.blocks.shape.tessellation import from_polygons, voronoi_blocks
 
 E, NU, RHO = 65e9, 0.2, 2700.0
 

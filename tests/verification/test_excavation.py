@@ -5,12 +5,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from graben.mechanics.blocks.bodies import build_bodies
-from graben.mechanics.blocks.excavation import excavate
-from graben.mechanics.blocks.in_situ import InSitu, put_in
-from graben.mechanics.blocks.joints import Joint
-from graben.mechanics.blocks.model import BlockModel
-from graben.mechanics.blocks.tessellation import from_polygons
+from graben.mechanics.blocks.contact.joints import Joint
+from graben.mechanics.blocks.engine.model import BlockModel
+from graben.mechanics.blocks.loading.excavation import excavate
+from graben.mechanics.blocks.loading.in_situ import InSitu, put_in
+from graben.mechanics.blocks.shape.bodies import build_bodies
+from graben.mechanics.blocks.shape.tessellation import from_polygons
 
 E, NU, RADIUS, FAR, KN = 20e9, 0.25, 1.0, 8.0, 1e12
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from graben.mechanics.blocks.compression import Courses, compress, consolidate, rectangle_sides
-from graben.mechanics.blocks.courses import Course
-from graben.mechanics.blocks.history import History, mean_stress
-from graben.mechanics.blocks.model import BlockModel
-from graben.mechanics.blocks.pace import ForceCheck, Pace
+from graben.mechanics.blocks.engine.model import BlockModel
+from graben.mechanics.blocks.loading.compression import Courses, compress, consolidate, rectangle_sides
+from graben.mechanics.blocks.loading.courses import Course
+from graben.mechanics.blocks.loading.pace import ForceCheck, Pace
+from graben.mechanics.blocks.record.history import History, mean_stress
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.schemas.scenes.blocks_loading import Loading
 from graben.stages.blocks.checkpoint import refuse_unlike

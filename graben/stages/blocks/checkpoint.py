@@ -12,9 +12,9 @@ import numpy as np
 
 import graben
 from graben.errors import BadInput, Fault, Refused
-from graben.mechanics.blocks import snapshot
-from graben.mechanics.blocks.history import History
-from graben.mechanics.blocks.model import BlockModel
+from graben.mechanics.blocks.engine.model import BlockModel
+from graben.mechanics.blocks.record import snapshot
+from graben.mechanics.blocks.record.history import History
 from graben.schemas.outputs import CHECKPOINT, beside
 from graben.schemas.saved import Arrays, read_saved, write_saved
 from graben.schemas.scene import Scene

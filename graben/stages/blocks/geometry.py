@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault, Refused
-from graben.mechanics.blocks import coverage
-from graben.mechanics.blocks.compression import rectangle_sides
-from graben.mechanics.blocks.joint_sets import JointSet, cut_by_sets
-from graben.mechanics.blocks.mending import mend
-from graben.mechanics.blocks.tessellation import Tessellation, voronoi_blocks, without
+from graben.mechanics.blocks.loading.compression import rectangle_sides
+from graben.mechanics.blocks.shape import coverage
+from graben.mechanics.blocks.shape.joint_sets import JointSet, cut_by_sets
+from graben.mechanics.blocks.shape.mending import mend
+from graben.mechanics.blocks.shape.tessellation import Tessellation, voronoi_blocks, without
 from graben.mechanics.plane.local_frame import local_origin
 from graben.mechanics.plane.polygons import signed_area
 from graben.mechanics.plane.rings import refuse_crossing, turning_corners

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from graben.mechanics.blocks.joints import Joint
+from graben.mechanics.blocks.contact.joints import Joint
 from graben.schemas.scenes.blocks import Joints
 
 

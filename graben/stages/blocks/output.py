@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from graben.mechanics.blocks.bodies import ear_clip
+from graben.mechanics.blocks.shape.bodies import ear_clip
 from graben.schemas.vtk import vtu_series
 
 # Of zones that can yield; in the files without "zone_".

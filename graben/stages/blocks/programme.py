@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault, Refused
-from graben.mechanics.blocks import programme as mechanics
-from graben.mechanics.blocks.courses import Course
-from graben.mechanics.blocks.excavation import blocks_in, excavate
-from graben.mechanics.blocks.history import History
-from graben.mechanics.blocks.loads import Loads
-from graben.mechanics.blocks.model import BlockModel
+from graben.mechanics.blocks.engine.model import BlockModel
+from graben.mechanics.blocks.loading import programme as mechanics
+from graben.mechanics.blocks.loading.courses import Course
+from graben.mechanics.blocks.loading.excavation import blocks_in, excavate
+from graben.mechanics.blocks.loading.loads import Loads
+from graben.mechanics.blocks.record.history import History
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.schemas.scenes.blocks_loading import Load, Programme
 from graben.stages.blocks.biaxial import energy_error, energy_measure, kinetic_measure, kinetic_share

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault, MachineFailed, NumericsFailed, Refused
-from graben.mechanics.blocks import snapshot
-from graben.mechanics.blocks.bodies import build_bodies
-from graben.mechanics.blocks.history import History
-from graben.mechanics.blocks.in_situ import InSitu, put_in
-from graben.mechanics.blocks.model import BlockModel, Damping
-from graben.mechanics.blocks.plastic_zones import Strength
-from graben.mechanics.blocks.tessellation import Tessellation
+from graben.mechanics.blocks.engine.model import BlockModel, Damping
+from graben.mechanics.blocks.loading.in_situ import InSitu, put_in
+from graben.mechanics.blocks.record import snapshot
+from graben.mechanics.blocks.record.history import History
+from graben.mechanics.blocks.shape.bodies import build_bodies
+from graben.mechanics.blocks.shape.tessellation import Tessellation
+from graben.mechanics.blocks.zones.plastic import Strength
 from graben.schemas.artifact import write_artifact
 from graben.schemas.files import together
 from graben.schemas.layouts.blocks import LAYOUT

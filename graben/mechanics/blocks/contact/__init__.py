@@ -1,0 +1,1 @@
+"""Where blocks touch: the law of joints, search of candidates, which of them sleep, and forces."""

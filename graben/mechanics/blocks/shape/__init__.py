@@ -1,0 +1,1 @@
+"""Where the blocks are: tessellations, given maps, straight joints, mending, bodies with grid points and zones."""
