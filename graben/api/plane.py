@@ -81,8 +81,9 @@ def plane_analysis(
     NumericsFailed : no equilibrium under gravity, or before the end where ``goal`` is "end"
     """
     from graben.mechanics.fem.body import Material as Filling
+    from graben.stages.fem_run.model import problem_of
     from graben.stages.fem_run.sizes import sizes_of
-    from graben.stages.fem_run.stage import Analysis, problem_of
+    from graben.stages.fem_run.stage import Analysis
     from graben.stages.shared.estimate import refuse_too_large
     from graben.stages.shared.record import silent
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from graben.mechanics.fem.body import Body, State
+from graben.mechanics.fem.collapse import Overload
 from graben.mechanics.fem.newton import Drag, NewtonOptions, Step, equilibrate
 
 _COARSE = 0.1  # of the march: steps that are too long to say where an overload begins
@@ -48,11 +50,12 @@ class StepOptions:
 
 @dataclass
 class March:
-    """What a march went through.
+    """How far a march is, and what it went through.
 
     Attributes
     ----------
     time, state, force, drag : the last equilibrium, its internal and its viscous forces
+    before : the state before the last step; None before the first
     complete : whether the end time was reached
     reason : why the last attempt failed (empty when complete)
     iterations, residuals : per accepted step: factorisations and their residuals
@@ -65,6 +68,7 @@ class March:
     state: State
     force: np.ndarray
     drag: np.ndarray
+    before: State | None = None
     complete: bool = False
     reason: str = ""
     iterations: list[int] = field(default_factory=list)
@@ -81,6 +85,15 @@ class March:
         return abs(self.external_work - self.internal_work - self.drag_work) / work if work > 0 else 0.0
 
 
+def at_rest(body: Body, state: State, time: float) -> March:
+    """A march that begins from a state, at a time, s.
+
+    The forces that balance the stresses are the internal ones: no work is missed at the start.
+    """
+    force = body.respond(state, np.zeros(body.pattern.size), False).force
+    return March(time, state, force, np.zeros_like(force))
+
+
 def march(
     body: Body,
     start: State,
@@ -89,36 +102,46 @@ def march(
     end: float,
     steps: StepOptions,
     newton: NewtonOptions,
+    **options: Any,
+) -> March:
+    """Follow the load history from `begin` to its end, s; arguments and options as in `advance`."""
+    run = at_rest(body, start, begin)
+    for _ in advance(run, body, external, end, steps, newton, **options):
+        pass
+    return run
+
+
+def advance(
+    run: March,
+    body: Body,
+    external: Callable[[float], np.ndarray],
+    end: float,
+    steps: StepOptions,
+    newton: NewtonOptions,
     *,
     prescribed: Callable[[float], np.ndarray] | None = None,
     save_times: np.ndarray | None = None,
     relaxation: float = 0.0,
-    accepted: Callable[[float, State, np.ndarray, Step], None] | None = None,
-    overloaded: Callable[[float, Step], str | None] | None = None,
-) -> March:
-    """Follow the load history from `begin` to `end`, s.
+    overload: Overload | None = None,
+) -> Iterator[Step]:
+    """Follow the load history to `end`, s: each equilibrium is given when `run` stands on it.
+
+    At last `run` is complete, or a step of the smallest length failed: the load of its time is then the last carried.
 
     Parameters
     ----------
+    run : of `at_rest`
     external : nodal loads (2 n,), N/m, at a time
-    prescribed : displacement of `body.fixed`, m, at a time; None: stays as it is in `start`
+    prescribed : displacement of `body.fixed`, m, at a time; None: stays as it is in the first state
     save_times : times that a step must end on
     relaxation : relaxation time, s, of the viscous stabilisation (see `newton.Drag`); 0: none
-    accepted : called after each equilibrium with time, state, internal forces and the step
-    overloaded : told of each equilibrium before; a text that it returns makes this one the last, not complete, for
-        that reason. A step of more than a tenth of the march is halved first
-
-    Returns
-    -------
-    March; not complete when a step of the smallest length failed: the load of `time` is then the last carried
+    overload : makes the first equilibrium that is one the last, not complete. A step of more than a tenth of the
+        march is halved first
     """
-    held = start.displacement[body.fixed].copy()
+    begin, held = run.time, run.state.displacement[body.fixed].copy()
     supports = prescribed if prescribed is not None else (lambda _t: held)
     stops = np.array([end]) if save_times is None else np.append(np.asarray(save_times, dtype=float), end)
     stops = np.unique(stops[(stops > begin) & (stops <= end)])
-    # At rest the forces that balance the stresses are the internal ones: no work is missed at the start.
-    force = body.respond(start, np.zeros(body.pattern.size), False).force
-    run = March(begin, start, force, np.zeros_like(force))
     load = external(begin)
     length, last_length = steps.first, 0.0
     elastic = None
@@ -144,31 +167,30 @@ def march(
             # The path may have bent: once more from rest before the step is halved.
             step = equilibrate(body, run.state, new_load, supports(target), newton, None, resist)
             run.factorisations += step.iterations
-        ended = overloaded(target, step) if overloaded is not None and step.converged else None
+        increment = step.state.displacement - run.state.displacement
+        ended = overload.reason(target, step.drag, increment) if overload is not None and step.converged else ""
         if not step.converged or (ended and steps.resolve and taken > _COARSE * (target - begin)):
             run.rejected += 1
             run.reason = ended or step.reason
             length = 0.5 * taken if run.iterations or taken > steps.smallest else _DOWN * taken
             if length < steps.least_after(run.time - begin):
-                return run
+                return
             continue
-        increment = step.state.displacement - run.state.displacement
         _book(run, body, step, increment, load, new_load)
         last_increment, last_length = increment, taken
+        run.before = run.state
         run.time, run.state, run.force, load = target, step.state, step.force, new_load
         run.iterations.append(step.iterations)
         run.residuals.append(step.residuals)
-        if accepted is not None:
-            accepted(run.time, run.state, run.force, step)
+        yield step
         if ended:
             run.reason = ended
-            return run
+            return
         if step.iterations <= steps.easy:
             length = min(1.5 * max(length, taken), steps.largest)
         elif step.iterations > steps.hard:
             length = max(taken * 2 / 3, min(taken, steps.smallest))
     run.complete, run.reason = True, ""
-    return run
 
 
 def _book(

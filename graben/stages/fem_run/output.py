@@ -1,4 +1,4 @@
-"""What fem-run keeps while it runs, and how it is written: artifact and VTU series."""
+"""What fem-run keeps of its states, and how it is written: artifact and VTU series."""
 
 from __future__ import annotations
 
@@ -9,88 +9,52 @@ from typing import Any
 import numpy as np
 
 from graben.mechanics.fem.body import Body, State
+from graben.mechanics.fem.collapse import LoadCurve
 from graben.mechanics.fem.march import March
-from graben.mechanics.fem.newton import Step
 from graben.mechanics.fem.surface import free_surface
 from graben.mechanics.meshes.mesh2d import QuadMesh
 from graben.schemas.artifact import write_artifact
 from graben.schemas.files import together
 from graben.schemas.layouts.fem import LAYOUT
-from graben.schemas.scenes.fem import FemScene
+from graben.schemas.scenes.fem import FemScene, Stepping
 from graben.schemas.vtk import vtu_series
 from graben.stages.shared.record import Record
 
+Saved = tuple[float, State, np.ndarray]
+"""Load time, s, a state, and its internal forces (2 n,), N/m."""
 
-class History:
-    """Saved states and the load history.
 
-    Parameters
-    ----------
-    scene : gives the times to save at
-    settled : the equilibrium under gravity, saved as the first state
-    settling : (2 n,) weights whose product with a displacement is the mean settlement of the loaded segment, m
-    length : length of that segment, m
-    pressure : pressure of the first rising load at time 0, Pa
-    """
+class SavedStates:
+    """The states that the artifact holds: under gravity, at the scene's times, and the last."""
 
-    def __init__(self, scene: FemScene, settled: March, settling: np.ndarray, length: float, pressure: float) -> None:
-        self._every, self._end = scene.stepping.save_every, scene.stepping.end
-        self._settling, self._length, self._start = settling, length, settled.state.displacement
-        self._latest: tuple[float, State, np.ndarray] = (0.0, settled.state, settled.force)
-        self.saved: list[tuple[float, State, np.ndarray]] = [self._latest]
-        self.previous: State | None = None
-        self.time, self.pressure, self.settlement, self.iterations = [0.0], [pressure], [0.0], [0]
-        self.carried = [pressure]
+    def __init__(self, stepping: Stepping, settled: March) -> None:
+        self._every, self._end = stepping.save_every, stepping.end
+        self._latest: Saved = (0.0, settled.state, settled.force)
+        self._saved = [self._latest]
 
-    def viscous(self, step: Step) -> float:
-        """Pressure that viscous forces carry in a step from the latest state, Pa."""
-        if step.drag is None:
-            return 0.0
-        increment = step.state.displacement - self._latest[1].displacement
-        moved = float(self._settling @ increment)
-        return float(step.drag @ increment) / (self._length * moved) if moved > 0 else 0.0
+    def add(self, run: March) -> None:
+        """Take in an accepted step; its state is kept if it falls on a time to save."""
+        self._latest = (run.time, run.state, run.force)
+        whole = round(run.time / self._every)
+        if abs(run.time - whole * self._every) < 1e-9 * self._end:
+            self._saved.append(self._latest)
 
-    def add(self, time: float, state: State, force: np.ndarray, step: Step, pressure: float) -> None:
-        """Take in an accepted step; keep its state if it falls on a time to save.
-
-        The pressure that the law carries is what remains of the applied one when the power of the viscous forces is
-        taken off that of the pressure.
-        """
-        self.carried.append(pressure - self.viscous(step))
-        self.previous = self._latest[1]
-        self._latest = (time, state, force)
-        self.time.append(time)
-        self.pressure.append(pressure)
-        self.settlement.append(float(self._settling @ (state.displacement - self._start)))
-        self.iterations.append(step.iterations)
-        whole = round(time / self._every)
-        if abs(time - whole * self._every) < 1e-9 * self._end:
-            self.saved.append(self._latest)
-
-    def states(self) -> list[tuple[float, State, np.ndarray]]:
+    def states(self) -> list[Saved]:
         """Saved states with the last one."""
-        return self.saved if self.saved[-1][0] == self._latest[0] else [*self.saved, self._latest]
-
-    def compliance_ratio(self) -> float:
-        """Settlement per pressure of the last step over that of the first; grows without bound at a collapse."""
-        movement, rise = np.diff(self.settlement), np.diff(self.pressure)
-        good = np.flatnonzero(rise > 0)
-        if not len(good) or movement[good[0]] == 0:
-            return 1.0
-        first, last = good[0], good[-1]
-        return float((movement[last] / rise[last]) / (movement[first] / rise[first]))
+        return self._saved if self._saved[-1][0] == self._latest[0] else [*self._saved, self._latest]
 
 
 def arrays_of(
     scene: FemScene,
     body: Body,
     settled: March,
-    history: History,
+    saved: SavedStates,
+    curve: LoadCurve,
     support_nodes: list[np.ndarray],
     external: Callable[[float], np.ndarray],
 ) -> dict[str, Any]:
     """Arrays of the layout "fem"; fields are element means (damage: the largest)."""
-    states = history.states()
+    states = saved.states()
     mesh, gravity = body.mesh, settled.state.displacement.reshape(-1, 2)
     weight = body.elements.weight / body.elements.weight.sum(axis=1, keepdims=True)
     times = np.array([t for t, _, _ in states])
@@ -126,11 +90,11 @@ def arrays_of(
         "surface_node": surface,
         "surface_distance": distance,
         "surface_displacement": movement[:, surface],
-        "step_time": history.time,
-        "step_pressure": history.pressure,
-        "step_carried_pressure": history.carried,
-        "step_settlement": history.settlement,
-        "step_iterations": history.iterations,
+        "step_time": curve.time,
+        "step_pressure": curve.pressure,
+        "step_carried_pressure": curve.carried,
+        "step_settlement": curve.settlement,
+        "step_iterations": curve.iterations,
     }
 
 

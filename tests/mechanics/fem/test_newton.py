@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from graben.mechanics.fem.march import StepOptions, march
+from graben.mechanics.fem.march import StepOptions, advance, at_rest, march
 from graben.mechanics.fem.newton import NewtonOptions, equilibrate
 from graben.mechanics.fem.quads import body_force, edge_traction
 from graben.mechanics.fem.stability import softest_stiffness
@@ -69,19 +69,20 @@ def test_one_plane_strain_element_does_what_the_point_driver_does(grid, body, ma
     side, _ = edge_traction(mesh, np.array([1.0, 0.0]), np.array([1.0, 1.0]))
     top = mesh.points[b.fixed // 2, 1] == 1.0
     top &= b.fixed % 2 == 1
-    ends = []
-    run = march(
-        b,
-        b.untouched(),
-        lambda t: min(1.0, t) * confining * side,
-        0.0,
-        2.0,
-        StepOptions(0.02, 0.02, 0.001),
-        NewtonOptions(1e-9),
-        prescribed=lambda t: np.where(top, squeeze * max(0.0, t - 1.0), 0.0),
-        save_times=np.array([1.0]),
-        accepted=lambda t, state, force, step: ends.append((t, state)),
-    )
+    run = at_rest(b, b.untouched(), 0.0)
+    ends = [
+        (run.time, run.state)
+        for _ in advance(
+            run,
+            b,
+            lambda t: min(1.0, t) * confining * side,
+            2.0,
+            StepOptions(0.02, 0.02, 0.001),
+            NewtonOptions(1e-9),
+            prescribed=lambda t: np.where(top, squeeze * max(0.0, t - 1.0), 0.0),
+            save_times=np.array([1.0]),
+        )
+    ]
     assert run.complete
     stress = run.state.stress.reshape(-1, 4)
     np.testing.assert_allclose(stress, np.broadcast_to(stress[0], stress.shape), rtol=1e-5, atol=10.0)
