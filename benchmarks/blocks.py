@@ -17,7 +17,6 @@ import numpy as np
 
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.contact.sleeping import AWAY, CLOSED
-from graben.mechanics.blocks.engine import relaxation as rx
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.compression import consolidate
 from graben.mechanics.blocks.shape.bodies import build_bodies
@@ -66,7 +65,7 @@ def granite(
     consolidate(model, -0.5e6, -0.25e6, tolerance=5e-2)
     # The same motion per step whatever the size: step costs compare.
     model.hold(bodies.vertex_side[:, 2], 1, -0.005)
-    model.motion.drive[rx.SPEED] = 1.0
+    model.set_speed(1.0)
     return model
 
 

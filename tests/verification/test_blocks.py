@@ -75,7 +75,7 @@ def test_wave_speed(axis, speed):
         t = model.time
         wall = 1e-3 * np.sin(np.pi * t / pulse * 2) ** 2 if t < 0.5 * pulse else 0.0
         model.hold(x == 0.0, axis, wall)
-        model.motion.drive[3] = 1.0
+        model.set_speed(1.0)
         model.advance(1)
         for k, probe in enumerate(probes):
             v = model.motion.v[probe, axis].mean()
@@ -104,7 +104,7 @@ def test_transmission_through_a_joint(ratio):
         t = model.time
         rise = min(1.0, t * omega / (4 * np.pi))
         model.hold(x == 0.0, 0, amplitude * rise * np.sin(omega * t))
-        model.motion.drive[3] = 1.0
+        model.set_speed(1.0)
         model.advance(1)
         seen.append((model.time, model.motion.v[behind, 0].mean()))
     t, v = np.array(seen).T
@@ -203,7 +203,7 @@ def test_joint_cycle_takes_the_area_of_its_loop():
     push, moved = [], []
     for speed, n in ((1e-4, steps), (-1e-4, 2 * steps), (1e-4, 2 * steps)):
         model.hold(over, 0, speed)
-        model.motion.drive[3] = 1.0
+        model.set_speed(1.0)
         for _ in range(n // 100):
             model.advance(100)
             push.append(model.motion.reaction[over, 0].sum())
@@ -213,7 +213,7 @@ def test_joint_cycle_takes_the_area_of_its_loop():
     loop = slice(steps // 100 - 1, None)
     work = float(np.sum(0.5 * (push[loop][1:] + push[loop][:-1]) * np.diff(moved[loop])))
     assert work == pytest.approx(2 * tau * (2 * d - 2 * tau / ks), rel=0.03)
-    friction_work = model.motion.sums[0]
+    friction_work = model.energies()["friction"]
     first = tau * (d - tau / ks)
     assert friction_work == pytest.approx(work + first, rel=0.03)
 
@@ -223,7 +223,7 @@ def test_dilation_opens_by_its_angle():
     y0 = model.motion.x[over, 1].mean()
     x0 = model.motion.x[over, 0].mean()
     model.hold(over, 0, 1e-4)
-    model.motion.drive[3] = 1.0
+    model.set_speed(1.0)
     model.advance(40000)
     slid = model.motion.x[over, 0].mean() - x0 - 1e6 * np.tan(np.radians(30)) / 1e9
     assert model.motion.x[over, 1].mean() - y0 == pytest.approx(slid * np.tan(np.radians(5)), rel=0.03)
@@ -266,5 +266,5 @@ def test_rotation_of_all_blocks_loads_neither_zones_nor_joints():
         out, _, stored = model.contacts()
         assert len(out) > 100
         # Overlaps of some 1e-15 m.
-        assert np.abs(model.motion.joint_force).max() < 1e-13 * model.joint.normal_stiffness
+        assert np.abs(model.motion.joint_force).max() < 1e-13 * model.joints[0].normal_stiffness
         assert stored < 1e-12

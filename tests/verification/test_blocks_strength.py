@@ -50,7 +50,7 @@ def biaxial_curve(bodies, joints, between, s3, shortening, steps=30000):
     model.advance(4000)
     model.skeleton.steady[top, 1] = 0.0
     model.hold(top, 1, -shortening / (steps * model.dt))
-    model.motion.drive[3] = 1.0
+    model.set_speed(1.0)
     push = []
     for _ in range(60):
         model.advance(steps // 60)

@@ -7,7 +7,6 @@ import pytest
 
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel
-from graben.mechanics.blocks.loading.excavation import excavate
 from graben.mechanics.blocks.loading.in_situ import InSitu, put_in
 from graben.mechanics.blocks.shape.bodies import build_bodies
 from graben.mechanics.blocks.shape.tessellation import from_polygons
@@ -31,7 +30,7 @@ def dug(sxx, syy):
         model.hold(bodies.vertex_side.any(axis=1), axis)
     model.advance(1)
     assert model.unbalanced_ratio() < 1e-9
-    excavate(model, np.arange(len(shapes)) == 0)
+    model.remove(np.arange(len(shapes)) == 0)
     model.advance(3000)
     return model
 

@@ -13,7 +13,7 @@ from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading import programme as mechanics
 from graben.mechanics.blocks.loading.courses import Course
-from graben.mechanics.blocks.loading.excavation import blocks_in, excavate
+from graben.mechanics.blocks.loading.excavation import blocks_in
 from graben.mechanics.blocks.loading.loads import Loads
 from graben.mechanics.blocks.record.history import History
 from graben.schemas.scenes.blocks import BlocksScene
@@ -113,7 +113,7 @@ class Rising:
             if m.time > history.start_time + history.time[-1]:
                 self._save(save)
             self.dug += 1
-            forces = excavate(m, blocks_in(m, np.array(dig.polygon)))
+            forces = m.remove(blocks_in(m, np.array(dig.polygon)))
             self.loads.take_off(m.removed[m.bodies.vertex_block])
             if dig.relax_over > 0.0:
                 self._release(rise.load_time, dig.relax_over, forces)

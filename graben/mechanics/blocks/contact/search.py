@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from graben.mechanics.blocks.contact.joints import FACING_NONE, OPEN, Pairs
+from graben.mechanics.blocks.contact.joints import FACING_NONE, OPEN, STICK, Pairs
 from graben.mechanics.blocks.contact.nodes import LENGTH, TX, TY, X, Y
 from graben.mechanics.compiled import kernel
 
@@ -134,6 +134,20 @@ def carry_history(keys, nodes, old, edge_material, set_of):
             live[k] = old.live[m]
             whole[k] = old.intact[m]
     return Pairs(keys, first, second, shear, slip, flag, live, whole, joint, seat)
+
+
+def bond_touching(pairs: Pairs, node: np.ndarray, follow: np.ndarray, within: float) -> None:
+    """Mark as intact the pairs that face each other without a gap, to `within` [m]."""
+    p = pairs
+    facing = -(node[p.first, TX] * node[p.second, TX] + node[p.first, TY] * node[p.second, TY])
+    normal = np.column_stack([node[p.first, TY], -node[p.first, TX]])
+    far = np.zeros(len(p.key))
+    for end in (p.second, follow[p.second]):
+        gap = ((node[end, :2] - node[p.first, :2]) * normal).sum(axis=1)
+        far = np.maximum(far, np.abs(gap))
+    whole = (facing > 0.9999) & (far < within)
+    p.intact[whole] = 1
+    p.flag[whole] = STICK
 
 
 def no_pairs() -> Pairs:

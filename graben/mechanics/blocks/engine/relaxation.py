@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
 
-from graben.mechanics.blocks.contact.forces import Rows, contact_forces, settle_rows
+from graben.mechanics.blocks.contact.forces import contact_forces, settle_rows
 from graben.mechanics.blocks.contact.nodes import node_motion, scatter_nodes
 from graben.mechanics.blocks.contact.sleeping import follow_blocks, line_up, look_again
 from graben.mechanics.blocks.engine.motion import (
@@ -20,87 +18,26 @@ from graben.mechanics.blocks.engine.motion import (
     AT_WALL,
     move_blocks,
 )
+from graben.mechanics.blocks.engine.records import (
+    DAMPED,
+    DAMPED_SEEN,
+    DAMPING,
+    FRICTION,
+    KINETIC,
+    LARGEST_OVERLAP,
+    LOAD,
+    LOAD_STEP,
+    LOAD_WORK,
+    PLASTIC,
+    RATE_SEEN,
+    SPEED,
+    SPEED_STEP,
+    WALL_WORK,
+)
 from graben.mechanics.blocks.engine.threads import all_there, arrive
 from graben.mechanics.compiled import kernel
 
 DONE, REBUILD, RUNAWAY, DEEP_OVERLAP, LEFT_ALONE = 0, 1, 2, 3, 4
-
-# Places in Motion.tally
-KINETIC, DAMPED, LOAD_WORK, WALL_WORK, RATE_SEEN, DAMPED_SEEN = range(6)
-# Places in Motion.sums
-FRICTION, LARGEST_OVERLAP, PLASTIC = range(3)
-# Places in Motion.drive
-DAMPING, LOAD, LOAD_STEP, SPEED, SPEED_STEP = range(5)
-
-
-class Skeleton(NamedTuple):
-    """What does not change while stepping: zones, contact nodes, masses, constraints and loads.
-
-    zones : ElasticZones, or another law of motion.py; first, second, weight, follow : contact nodes
-    mass : (vertices,) [kg/m]; still : (k, 2) vertex and axis of prescribed velocities, wall : (vertices, 2) [m/s];
-    still_start : (parts + 1,) where those of each part begin
-    steady, rising : (vertices, 2) forces [N/m]; the load is steady + drive[LOAD] * rising
-    """
-
-    zones: Any
-    first: np.ndarray
-    second: np.ndarray
-    weight: np.ndarray
-    follow: np.ndarray
-    mass: np.ndarray
-    still: np.ndarray
-    still_start: np.ndarray
-    wall: np.ndarray
-    steady: np.ndarray
-    rising: np.ndarray
-
-
-class Motion(NamedTuple):
-    """What changes: positions and velocities of vertices and of contact nodes, forces, running sums, and who sleeps.
-
-    x, v, zone_force, joint_force, reaction : (vertices, 2); node : node table (nodes, 8); fn : (nodes, 2)
-    From start on (sleeping.py): which candidates are awake, part by part, and when to look at each of them again.
-    start : (parts + 1,) first candidate of each part, that of its first edge; awake ones have rows (valid while
-    stepping, between `begin` and `end`), those of part p and set of joints s from turn[p, s] to turn[p, s + 1]
-    kind : (n,) what a candidate was when last looked at; wake : (n,) path [m] of its blocks at which to look again
-    far_start : (parts + 1,), far_of : (n,) row of `far` (rows, 4) through which a pair hands forces on to another
-    part, -1 within a part; post_start : (parts + 1,), post : (rows, 2) row and node of the forces handed to each part
-    path, gone : (blocks,) bounds on the path of a block's nodes up to the reference and up to now; reference,
-    built : (nodes, 2) positions then and at the search; farthest : (parts, 2) squares of distance since, and speed
-    due : (1,) steps until the next look at how far nodes went
-    """
-
-    x: np.ndarray
-    v: np.ndarray
-    zone_force: np.ndarray
-    joint_force: np.ndarray
-    reaction: np.ndarray
-    node: np.ndarray
-    fn: np.ndarray
-    tally: np.ndarray
-    sums: np.ndarray
-    drive: np.ndarray
-    start: np.ndarray
-    rows: Rows
-    turn: np.ndarray
-    kind: np.ndarray
-    wake: np.ndarray
-    far_start: np.ndarray
-    far_of: np.ndarray
-    far: np.ndarray
-    post_start: np.ndarray
-    post: np.ndarray
-    path: np.ndarray
-    gone: np.ndarray
-    reference: np.ndarray
-    built: np.ndarray
-    farthest: np.ndarray
-    due: np.ndarray
-
-
-def private(m: Motion) -> Motion:
-    """The same motion for another thread: it decides for itself, from numbers of its own."""
-    return m._replace(tally=m.tally.copy(), sums=m.sums.copy(), drive=m.drive.copy(), due=m.due.copy())
 
 
 @kernel(error_model="numpy")
@@ -190,15 +127,15 @@ def _gather(m, sums, damping_ratio, damping_limit, alpha, dt):
     wall_work = 0.0
     largest = 0.0
     for p in range(sums.shape[0]):
-        m.sums[FRICTION] += sums[p, AT_FRICTION]
-        m.sums[PLASTIC] += sums[p, AT_PLASTIC]
+        m.ledger[FRICTION] += sums[p, AT_FRICTION]
+        m.ledger[PLASTIC] += sums[p, AT_PLASTIC]
         largest = max(largest, sums[p, AT_OVERLAP])
         kinetic += sums[p, AT_KINETIC]
         damped += sums[p, AT_DAMPED]
         load_work += sums[p, AT_LOAD]
         wall_work += sums[p, AT_WALL]
-    m.sums[LARGEST_OVERLAP] = largest
-    t = m.tally
+    m.ledger[LARGEST_OVERLAP] = largest
+    t = m.ledger
     if damping_ratio >= 0.0:
         keep = 0.98
         t[RATE_SEEN] = keep * t[RATE_SEEN] + (1.0 - keep) * abs(kinetic - t[KINETIC])
@@ -253,38 +190,15 @@ def _next_drive(m):
 
 
 @kernel(error_model="numpy", nogil=True)
-def advance(
-    me,
-    board,
-    plan,
-    sums,
-    m,
-    steps,
-    s,
-    parts,
-    pairs,
-    joints,
-    dt,
-    skin,
-    near,
-    dilation,
-    deepest,
-    damping_ratio,
-    damping_limit,
-    local,
-    fastest,
-):
-    """Up to `steps` steps of `dt` [s] on the parts of thread `me`. Returns (status, steps done, pair concerned).
+def advance(me, board, plan, sums, m, steps, s, parts, pairs, joints, rules):
+    """Up to `steps` steps on the parts of thread `me`. Returns (status, steps done, pair concerned).
 
     board, plan : as in threads.py; sums : (2, parts, motion.COLUMNS) work space shared by all threads
-    m, s, parts : Motion, Skeleton, Parts; joints : table of sets of joints; dilation : largest tangent among them.
-    Threads share all arrays of m but tally, sums, drive and due: each takes the same decisions from its own.
-    skin, near : reach of the candidates and of the awake ones [m]; deepest : overlap limit [m]
-    damping_ratio : adaptive global damping holds its power at this ratio to the rate of kinetic energy; below 0
-    the damping coefficient in motion.drive stays as it is; damping_limit : its upper bound [1/s]
-    local : share of the unbalanced force taken off against the velocity
-    fastest : kinetic energy that stops the run [J/m]
+    m, s, parts, rules : Motion, Skeleton, Parts, Rules; joints : table of sets of joints
+    Threads share all arrays of m but ledger, drive and due: each takes the same decisions from its own.
     """
+    dt, near, dilation, deepest, local = rules.dt, rules.near, rules.dilation, rules.deepest, rules.local
+    damping_ratio, damping_limit = rules.damping_ratio, rules.damping_limit
     first = plan.first[me]
     stop = plan.first[me + 1]
     pushes, pushed = plan.pushes, plan.pushed
@@ -297,7 +211,7 @@ def advance(
             arrive(board, me, turn)
             if not all_there(board, turn):
                 return LEFT_ALONE, step, -1
-            if not _worst(m.farthest[:, 0]) < (0.5 * skin) ** 2:
+            if not _worst(m.farthest[:, 0]) < (0.5 * rules.reach) ** 2:
                 return REBUILD, step, -1
             for p in range(first, stop):
                 look_again(p, parts, pairs, s.follow, m.node, near, dilation, m)
@@ -329,8 +243,8 @@ def advance(
             return LEFT_ALONE, step, -1
         bad = _deep(now)
         if bad >= 0:
-            m.sums[LARGEST_OVERLAP] = now[:, AT_OVERLAP].max()
+            m.ledger[LARGEST_OVERLAP] = now[:, AT_OVERLAP].max()
             return DEEP_OVERLAP, step, bad
-        if not _gather(m, now, damping_ratio, damping_limit, alpha, dt) < fastest:
+        if not _gather(m, now, damping_ratio, damping_limit, alpha, dt) < rules.most_energy:
             return RUNAWAY, step, -1
     return DONE, steps, -1

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from graben.errors import NumericsFailed, Refused
-from graben.mechanics.blocks.engine import relaxation as rx
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
 from graben.mechanics.blocks.loading.courses import Course
 from graben.mechanics.blocks.loading.pace import ForceCheck, Pace
@@ -98,13 +97,12 @@ class Courses:
 
     def drive(self, model: BlockModel, done: float, pace: float, top_speed: float) -> None:
         """Set wall speed (over top_speed) and pressure for steps that follow step `done`, each worth `pace` steps."""
-        d, scale = model.motion.drive, pace / top_speed
+        scale = pace / top_speed
         # The speed in the middle of a step moves the wall by just what the course says.
         slope = self.speed.slope(done) * pace * scale
-        d[rx.SPEED], d[rx.SPEED_STEP] = self.speed.at(done) * scale + 0.5 * slope, slope
+        model.set_speed(self.speed.at(done) * scale + 0.5 * slope, slope)
         if self.pressure is not None:
-            d[rx.LOAD] = self.pressure.at(done) - self.pressure.values[0]
-            d[rx.LOAD_STEP] = self.pressure.slope(done) * pace
+            model.set_load(self.pressure.at(done) - self.pressure.values[0], self.pressure.slope(done) * pace)
 
 
 def compress(
@@ -136,10 +134,9 @@ def compress(
         save(0, model)
         saved = 1
     if saved == 1:
-        model.skeleton.steady[top, 1] = model.weight[top, 1]
+        model.take_off_steady(top, 1)
         model.hold(top, 1, speed)
-        d = model.motion.drive
-        d[rx.SPEED], d[rx.SPEED_STEP] = 0.0, 1.0 / max(1.0, ramp_share * steps)
+        model.set_speed(0.0, 1.0 / max(1.0, ramp_share * steps))
     for k in range(saved, states):
         begin, end = (round(steps * j / (states - 1)) for j in (k - 1, k))
         done = float(begin)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from graben.errors import Refused
-from graben.mechanics.blocks.contact.joints import _BEND, STICK, STIFFENING
+from graben.mechanics.blocks.contact.joints import _BEND, STICK, STIFFENING, Pairs
 from graben.mechanics.blocks.contact.nodes import LENGTH, TX, TY, X, Y
 from graben.mechanics.blocks.engine.model import BlockModel
 
@@ -38,12 +38,11 @@ def put_in(model: BlockModel, field: InSitu) -> None:
 
     Raises Refused where the rock is too soft for it.
     """
-    _stress_zones(model, field)
-    _stress_joints(model, field)
-    model.rebuild()
+    model.put_stress(*_unstressed_zones(model, field), _stressed_pairs(model, field))
 
 
-def _stress_zones(model: BlockModel, field: InSitu) -> None:
+def _unstressed_zones(model: BlockModel, field: InSitu) -> tuple[np.ndarray, np.ndarray]:
+    """Gradients and areas of zones which the present ones are strained copies of."""
     z = model.skeleton.zones
     x = model.motion.x[z.triangles]
     sigma = field.at(x[..., 1].mean(axis=1))
@@ -63,11 +62,11 @@ def _stress_zones(model: BlockModel, field: InSitu) -> None:
         u = (c + root * one) / np.sqrt(np.trace(c, axis1=1, axis2=2)[:, None, None] + 2.0 * root)
     gradient = np.ascontiguousarray(z.gradient @ u)
     area = z.area / np.linalg.det(u)
-    model.skeleton = model.skeleton._replace(zones=z._replace(gradient=gradient, area=area))
+    return gradient, area
 
 
-def _stress_joints(model: BlockModel, field: InSitu) -> None:
-    """Shear stress and seat of all pairs of block edges that face each other without a gap."""
+def _stressed_pairs(model: BlockModel, field: InSitu) -> Pairs:
+    """Candidates with shear stress and seat of all pairs of block edges that face each other without a gap."""
     p, b, skin = model.pairs, model.bodies, model.skin
     node = model.motion.node
     e, f = skin.edge[p.first], skin.edge[p.second]
@@ -105,7 +104,7 @@ def _stress_joints(model: BlockModel, field: InSitu) -> None:
         shear[on, k] = (traction * t).sum(axis=1)
     p.live[on] = 1
     p.flag[on] = STICK
-    model.pairs = p._replace(seat=seat)
+    return p._replace(seat=seat)
 
 
 def _closure(pressure: np.ndarray, kn: np.ndarray, closure: np.ndarray) -> np.ndarray:

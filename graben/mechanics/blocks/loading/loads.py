@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from graben.mechanics.blocks.engine import relaxation as rx
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.courses import Course
 
@@ -36,13 +35,11 @@ class Loads:
 
     def begin(self, model: BlockModel, time: float) -> None:
         """Set the model's loads for the stretch from `time` to the next point."""
-        s = model.skeleton
-        s.steady[:] = model.weight
-        s.rising[:] = 0.0
+        steady, rising = model.weight.copy(), np.zeros_like(model.weight)
         for force, course in self.patterns:
-            s.steady[:] += course.at(time) * force
-            s.rising[:] += course.slope(time) * force
-        model.motion.drive[rx.LOAD] = 0.0
+            steady += course.at(time) * force
+            rising += course.slope(time) * force
+        model.set_loads(steady, rising)
 
     def next_point(self, time: float) -> float:
         """Time of the next point of any course; infinite after the last."""

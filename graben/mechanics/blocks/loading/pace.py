@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from graben.mechanics.blocks.engine import relaxation as rx
 from graben.mechanics.blocks.engine.model import BlockModel
 
 # Weight of what was seen before, look by look: vibrations even out, inertia stays.
@@ -60,9 +59,9 @@ class Pace:
 def force_shares(model: BlockModel, bottom: np.ndarray, top: np.ndarray) -> tuple[float, float]:
     """Lateral stress inside over applied, less 1; and what the bottom carries less than the top,
     over the larger of both. Loose blocks do not count."""
-    s, m = model.skeleton, model.motion
+    m = model.motion
     there = ~model.loose_blocks()[model.bodies.vertex_block]
-    applied = s.steady[:, 0] + m.drive[rx.LOAD] * s.rising[:, 0]
+    applied = model.load()[:, 0].copy()
     x = np.where(there, m.x[:, 0] - m.x[there, 0].mean(), 0.0)
     moment = float(applied @ x)
     lateral = -float((m.zone_force[:, 0] + m.joint_force[:, 0] + applied) @ x) / moment

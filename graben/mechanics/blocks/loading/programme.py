@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from graben.errors import NumericsFailed, Refused
-from graben.mechanics.blocks.engine import relaxation as rx
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
 from graben.mechanics.blocks.loading.loads import Loads
 from graben.mechanics.blocks.shape.bodies import Bodies
@@ -158,20 +157,19 @@ def look_at(
     end : load time at which the rise is complete [s]; reference : vertex positions that settlement counts from
     stop : load time that the chunk must not run past; it does not run past points of courses either
     """
-    m = model.motion
     calm, chunk = rise.imbalance < control.calm, control.chunk
     point = loads.next_point(rise.since)
     if calm:
         left = (min(stop, point) - rise.load_time) / model.dt
         chunk = int(min(chunk, max(1.0, np.rint(left))))
-    m.drive[rx.LOAD_STEP] = model.dt if calm else 0.0
+    model.raise_load(model.dt if calm else 0.0)
     model.advance(chunk)
-    m.drive[rx.LOAD_STEP] = 0.0
-    rise.load_time = rise.since + float(m.drive[rx.LOAD])
+    model.raise_load(0.0)
+    rise.load_time = rise.since + model.load_factor
     if rise.load_time > point - 0.5 * model.dt:
         rise.since = rise.load_time = point
         loads.begin(model, point)
-    settlement = settlement_of(loads.direction, m.x - reference)
+    settlement = settlement_of(loads.direction, model.motion.x - reference)
     rise.speed = (settlement - rise.settlement) / (chunk * model.dt)
     rise.settlement = settlement
     rise.imbalance = imbalance(model)

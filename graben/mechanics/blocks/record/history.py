@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from graben.errors import Refused
-from graben.mechanics.blocks.engine import relaxation as rx
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.record.balance import balance
 
@@ -85,8 +84,8 @@ class History:
         if self.optional:
             for name, values in balance(m, rows["zone_stress"][-1], force)._asdict().items():
                 rows[name].append(values)
-        self.overlap.append(float(m.motion.sums[rx.LARGEST_OVERLAP]))
-        self.damping.append(float(m.motion.drive[rx.DAMPING]))
+        self.overlap.append(m.largest_overlap)
+        self.damping.append(m.damping_coefficient)
 
     def cut(self, states: int) -> None:
         """Forget all but the first saved states."""

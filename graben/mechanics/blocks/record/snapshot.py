@@ -46,7 +46,7 @@ def bring_back(model: BlockModel, state: dict[str, np.ndarray]) -> None:
     model.pairs = _group(model, state, "pairs")
     _refuse_pairs(model)
     model.held[:] = state["held"]
-    model._list_held()
+    model.list_held()
     sleep = fresh_sleep(model.pairs, model.parts, model.motion.node, len(model.joints))
     model.motion = model.motion._replace(**sleep)
     for group in ("motion", "skeleton", "skeleton.zones"):

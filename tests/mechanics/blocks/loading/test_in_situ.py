@@ -7,7 +7,7 @@ from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
 from graben.mechanics.blocks.loading import programme
 from graben.mechanics.blocks.loading.compression import rectangle_sides
-from graben.mechanics.blocks.loading.excavation import blocks_in, excavate
+from graben.mechanics.blocks.loading.excavation import blocks_in
 from graben.mechanics.blocks.loading.in_situ import InSitu, put_in
 from graben.mechanics.blocks.record import snapshot
 from graben.mechanics.blocks.shape.bodies import build_bodies
@@ -113,7 +113,7 @@ def test_a_column_whose_support_is_taken_out_falls():
     assert np.abs(model.motion.v).max() < 1e-8
     lowest = blocks_in(model, np.array([(-1, 0.2), (2, 0.2), (2, 0.8), (-1, 0.8)]))
     assert lowest.tolist() == [True, False, False, False]
-    held = excavate(model, lowest)
+    held = model.remove(lowest)
     # It bore what stands on it.
     assert held.sum(axis=0) == pytest.approx([0.0, 3 * 2500.0 * G], abs=1.0)
     error = model.energies()["error"]
@@ -136,7 +136,7 @@ def test_forces_of_what_was_taken_out_can_stand_in_for_it():
     model = column()
     model.advance(200)
     lowest = np.array([True, False, False, False])
-    held = excavate(model, lowest)
+    held = model.remove(lowest)
     model.skeleton.steady[:] += held
     before = model.motion.x.copy()
     model.advance(500)
@@ -151,7 +151,7 @@ def test_a_model_with_a_hole_is_brought_back_bitwise():
 
     model = dug()
     model.advance(100)
-    excavate(model, blocks_in(model, np.array([(1, 1), (3, 1), (3, 3), (1, 3)], float)))
+    model.remove(blocks_in(model, np.array([(1, 1), (3, 1), (3, 3), (1, 3)], float)))
     model.advance(500)
     state = snapshot.take(model)
     again = dug()

@@ -44,7 +44,7 @@ def moving():
     consolidate(model, -0.5e6, -0.25e6)
     compress(model, -0.0006, 2000, 2, lambda k, m: None)
     m = model.motion
-    x, v, alpha = m.x.copy(), m.v.copy(), float(m.drive[0])
+    x, v, alpha = m.x.copy(), m.v.copy(), model.damping_coefficient
     model.advance(1)
     mass = model.skeleton.mass[:, None]
     drag = np.where(model.held, 0.0, alpha * mass * 0.5 * (m.v + v))

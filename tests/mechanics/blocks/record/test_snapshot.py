@@ -89,7 +89,7 @@ def swapped(state):
         cut("pairs.key", "pairs.first", "pairs.second"),
         cut("motion.x"),
         cut("motion.wake"),
-        cut("motion.sums"),
+        cut("motion.ledger"),
         cut("skeleton.zones.gradient"),
         cut("held"),
         lambda state: state.pop("motion.v"),

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from graben.mechanics.blocks.contact.joints import Joint
-from graben.mechanics.blocks.engine import relaxation as rx
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
 from graben.mechanics.blocks.loading.compression import compress, consolidate
 from graben.mechanics.blocks.record import snapshot
@@ -213,7 +212,7 @@ def test_threads_give_bitwise_the_same():
     for model in (one, other):
         model.hold(model.bodies.vertex_side[:, 0], 1)
         model.hold(model.bodies.vertex_side[:, 2], 1, -0.01)
-        model.motion.drive[rx.SPEED] = 1.0
+        model.set_speed(1.0)
         model.advance(400)
     assert np.array_equal(one.motion.x, other.motion.x)
     assert np.array_equal(one.motion.reaction, other.motion.reaction)

@@ -1,0 +1,131 @@
+"""What a model is made of before it moves: zones, masses that its time step carries, sets of joints of edges."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from graben.errors import Refused
+from graben.mechanics.blocks.contact.joints import RIM_SHARE, Joint
+from graben.mechanics.blocks.contact.nodes import COLUMNS, RIM
+from graben.mechanics.blocks.contact.search import no_pairs
+from graben.mechanics.blocks.contact.sleeping import fresh_sleep
+from graben.mechanics.blocks.engine.records import DRIVE_SLOTS, LEDGER_SLOTS, Motion
+from graben.mechanics.blocks.shape.bodies import Bodies, Skin
+from graben.mechanics.blocks.shape.partition import Parts, runs
+from graben.mechanics.blocks.zones.elastic import ElasticZones, lame, shape_gradients, stiffness_row_sums
+from graben.mechanics.blocks.zones.plastic import PlasticZones, Strength, plastic_zones
+from graben.mechanics.blocks.zones.rigid import RigidBlocks, rigid_blocks, stiffest_motion
+from graben.mechanics.cache_lines import aligned
+
+# Time step over the estimate 2 / omega of the stiffest vertex (row sums bound omega from above).
+SAFETY = 0.9
+
+
+class Rock(NamedTuple):
+    """Rock of all blocks: young [Pa], poisson, density [kg/m3]; strength at which zones yield, None: elastic;
+    rigid : blocks do not deform, the moduli and the strength then count for nothing.
+    """
+
+    young: float
+    poisson: float
+    density: float
+    strength: Strength | None = None
+    rigid: bool = False
+
+
+class Made(NamedTuple):
+    """zones : their law; area : (zones,) [m2]; mass, true_mass : (vertices,) [kg/m]; dt [s]"""
+
+    zones: ElasticZones | PlasticZones | RigidBlocks
+    area: np.ndarray
+    mass: np.ndarray
+    true_mass: np.ndarray
+    dt: float
+
+
+def refuse_unsound(rock: Rock, joints: Sequence[Joint]) -> None:
+    """Refused where moduli, density or a stiffness of joints are out of range."""
+    kn = min(j.normal_stiffness for j in joints)
+    for name, value in (("young", rock.young), ("density", rock.density), ("kn", kn)):
+        if not value > 0.0:
+            raise Refused(f"{name} must be positive, found {value}")
+    if not -1.0 < rock.poisson < 0.5:
+        raise Refused(f"poisson must lie between -1 and 0.5, found {rock.poisson}")
+
+
+def zones_and_masses(bodies: Bodies, rock: Rock, joints: Sequence[Joint], dt: float | None) -> Made:
+    """Zones, and masses that make the time step stable; dt None: true masses, and dt from the estimate."""
+    gradient, area = shape_gradients(bodies.position, bodies.zone_vertex)
+    lam, mu = (np.full(len(area), c) for c in lame(rock.young, rock.poisson))
+    thirds = np.repeat(rock.density * area / 3.0, 3)
+    true_mass = np.bincount(bodies.zone_vertex.ravel(), weights=thirds, minlength=len(bodies.position))
+    elastic = ElasticZones(bodies.zone_vertex.astype(np.int32), gradient, area, lam, mu)
+    law: ElasticZones | PlasticZones | RigidBlocks = elastic
+    stiffest = max(max(j.stiffest, j.shear_stiffness) for j in joints)
+    if rock.rigid:
+        law = rigid_blocks(bodies, rock.density, area, runs(bodies.vertex_block)[1])
+        owner = np.repeat(np.arange(len(law.place)), np.diff(law.first))
+        stiffness = true_mass * (stiffest_motion(bodies, law, stiffest) / law.inertia[:, 0])[owner]
+    else:
+        stiffness = _vertex_stiffness(bodies, stiffest, stiffness_row_sums(gradient, area, lam, mu))
+    if rock.strength is not None and not rock.rigid:
+        law = plastic_zones(elastic, rock.young, rock.poisson, rock.strength)
+    if dt is None:
+        step = float(SAFETY * np.sqrt(4.0 * true_mass / stiffness).min())
+        return Made(law, area, true_mass.copy(), true_mass, step)
+    mass = stiffness * dt**2 / (4.0 * SAFETY**2)
+    if isinstance(law, RigidBlocks):
+        law.inertia[:, 0] *= (mass / true_mass)[law.first[:-1]]
+    return Made(law, area, mass, true_mass, float(dt))
+
+
+def _vertex_stiffness(bodies: Bodies, stiffest: float, rows: np.ndarray) -> np.ndarray:
+    """Bound on the stiffness that a vertex sees, from zones and from the joints along its edges [N/m per m]."""
+    total = np.bincount(bodies.zone_vertex.ravel(), weights=rows.ravel())
+    length = np.linalg.norm(bodies.position[bodies.edge_to] - bodies.position[bodies.edge_from], axis=1)
+    # An edge holds half its length at each end, against another block: twice in a row sum. Sliding blocks
+    # can face two others, so the half counts in full.
+    k = 2.0 * stiffest
+    np.add.at(total, bodies.edge_from, k * length)
+    np.add.at(total, bodies.edge_to, k * length)
+    return total
+
+
+def sets_of_edges(
+    bodies: Bodies, count: int, edge_set: np.ndarray | None, set_between: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Set of each outline edge, and the set that holds between edges of two sets; as given, checked."""
+    sets = np.arange(count)
+    given = np.zeros(len(bodies.edge_from)) if edge_set is None else np.asarray(edge_set)
+    between = np.minimum.outer(sets, sets) if set_between is None else np.asarray(set_between)
+    if given.shape != bodies.edge_from.shape or not np.isin(given, sets).all():
+        raise Refused(f"edge_set: expected {len(bodies.edge_from)} numbers of joint sets (0 to {sets[-1]})")
+    if between.shape != (len(sets),) * 2 or not np.isin(between, sets).all() or np.any(between != between.T):
+        raise ValueError(f"set_between: expected a symmetric table {len(sets)} x {len(sets)} of joint sets")
+    return given.astype(np.int64), np.ascontiguousarray(between, dtype=np.int64)
+
+
+def at_rest(bodies: Bodies, skin: Skin, parts: Parts) -> Motion:
+    """Motion of bodies that have not moved, with no candidates yet."""
+    nv, nn = len(bodies.position), len(skin.first)
+    none: dict[str, Any] = fresh_sleep(no_pairs(), parts, np.zeros((nn, COLUMNS)))
+    motion = Motion(
+        bodies.position.copy(),
+        np.zeros((nv, 2)),
+        np.zeros((nv, 2)),
+        np.zeros((nv, 2)),
+        np.zeros((nv, 2)),
+        aligned(nn, COLUMNS),
+        aligned(nn, 2),
+        np.zeros(LEDGER_SLOTS),
+        np.zeros(DRIVE_SLOTS),
+        **none,
+    )
+    x = bodies.position
+    point = x[skin.first] + skin.weight[:, None] * (x[skin.second] - x[skin.first])
+    length = np.linalg.norm(point[skin.follow] - point, axis=1)
+    motion.node[:, RIM] = np.where(skin.is_chamfer, RIM_SHARE * length, 0.0)
+    return motion
