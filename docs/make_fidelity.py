@@ -52,13 +52,15 @@ def table(stage: Stage) -> list[str]:
 def row(k: Knob, steady: bool) -> str:
     """One knob."""
     name = f"`{k.key}`" if k.settable else "no key"
-    unit = "" if k.unit == "1" or not steady else f" {k.unit}"
+    unit = "" if k.unit == "1" or not steady or k.standard is None else f" {k.unit}"
     values = [shown(v) + unit for v in (k.draft, k.standard, k.reference)]
     return "| " + " | ".join([name, k.trades, *values]) + " |"
 
 
 def shown(value: object) -> str:
     """A value, or a rule in words."""
+    if value is None:
+        return "none"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

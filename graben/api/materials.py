@@ -146,7 +146,7 @@ def follow(
     mode: str = "plane-strain",
     *,
     start: ArrayLike | None = None,
-    length: float = 1.0,
+    length: float = 10.0,
     increments: int = 1,
     tolerance: float = 1e-9,
 ) -> Followed:
@@ -163,7 +163,7 @@ def follow(
         and s for stress: then strain and stress are (steps, n), and each component follows that of its letter. n is 3
         for plane stress (xx, yy, xy), 4 (xx, yy, zz, xy) or 6 (xx, yy, zz, xy, yz, zx)
     start : (n,) stress at the start, Pa; the lateral stress in xx, yy and zz unless given ("plane-stress": not in zz)
-    length : characteristic length in m, for laws with damage
+    length : characteristic length in m, for laws with damage; that of `fit` unless given
     increments : between two steps
     tolerance : on prescribed stresses, relative to the largest stress
 

@@ -20,6 +20,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from graben.declared.knobs import knob
+from graben.declared.laws import parameter
 from graben.errors import Refused
 
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
@@ -250,10 +251,18 @@ def key(default: Any = ..., description: str = "", **constraints: Any) -> Any:
     return Field(default, description=description, **constraints)
 
 
+def law_key(law: str, name: str, default: Any, description: str) -> Any:
+    """A scene key that is a parameter of a law of the package: its bounds are the declared ones."""
+    p = parameter(law, name)
+    assert p is not None and p.form == "number"
+    return key(default, description, ge=p.lower, le=p.upper)
+
+
 def knob_key(kind: str, name: str, description: str, **constraints: Any) -> Any:
     """A scene key that is a knob of accuracy: its default is the declared one, and None where fidelity turns it."""
     found = knob(kind, name)
     if not found.steady:
         return key(None, f"{description}; left out: {found}", **constraints)
     value = found.standard
-    return key(value if found.unit == "1" else f"{value:g} {found.unit}", description, **constraints)
+    bare = value is None or found.unit == "1"
+    return key(value if bare else f"{value:g} {found.unit}", description, **constraints)

@@ -20,6 +20,7 @@ from graben.stages.scratch import stage as scratch
 from graben.stages.shared.fidelity import setting
 
 ROOT = Path(__file__).parents[2]
+EVERY_TABLE = {"blocks": {"programme": {}}}
 NEEDED = {"particles": {"grains": [{"name": "sand", "diameter": "100 um"}]}}
 every_fidelity = pytest.mark.parametrize("fidelity", FIDELITIES)
 every_stage = pytest.mark.parametrize("stage", STAGES, ids=lambda s: s.kind)
@@ -36,7 +37,7 @@ def of(some, key):
 @every_stage
 def test_keys_are_those_of_the_scene_and_their_defaults_are_the_declared_ones(stage):
     assert stage.kind in SCENES
-    plain = scene(stage.kind)
+    plain = scene(stage.kind, **EVERY_TABLE.get(stage.kind, {}))
     for k in stage.knobs:
         values = [k.at(fidelity) for fidelity in FIDELITIES]
         if not k.settable:

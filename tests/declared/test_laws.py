@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from graben.declared.laws import PARAMETERS, declare
+from graben.declared.laws import PARAMETERS, declare, parameter
 from graben.declared.parameter import Parameter
 from graben.errors import Refused
 from graben.mechanics.materials import hardening, j2_hardening, lubliner_curves
@@ -140,6 +140,22 @@ def test_the_bounds_of_calibrates_template_lie_within_those_of_its_law():
     scene = load_scene({"kind": "calibrate"}, "calibrate")
     problem = problem_of(scene, scene.source.path, "template")
     assert problem.box.size == len(scene.free) > 5
+
+
+@pytest.mark.parametrize(
+    ("key", "name"),
+    [("young", "young_modulus"), ("poisson", "poisson_ratio"), ("friction", "friction_angle"),
+     ("cohesion", "cohesion"), ("tension", "tensile_strength"), ("dilation", "dilation_angle")],
+)  # fmt: skip
+def test_the_rock_of_blocks_has_the_bounds_of_its_law(key, name):
+    def rock(value):
+        text = value if p.unit == "1" else f"{value!r} {p.unit}"
+        return {"kind": "blocks", "rock": {"zones": "mohr-coulomb", "friction": "80 deg", key: text}}
+
+    p = parameter("mohr-coulomb", name)
+    assert getattr(load_scene(rock(p.upper), "blocks").rock, key) == p.upper
+    with pytest.raises(ValueError, match=rf"rock.{key} = .*: expected less than or equal to"):
+        load_scene(rock(1.001 * p.upper), "blocks")
 
 
 @pytest.mark.parametrize("part", ["lower", "upper"])

@@ -159,7 +159,7 @@ class CurveFit:
     free: Sequence[str]
     curves: Sequence[Curve]
     weights: Weights = field(default_factory=Weights)
-    length: float = 1.0
+    length: float = 10.0
     parts: int = 2
     seat_parts: int = 4
     tolerance: float = 1e-8

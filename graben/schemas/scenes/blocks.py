@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Literal
 
 from pydantic import model_validator
@@ -16,10 +17,15 @@ from graben.schemas.quantities import (
     Pressure,
     Switch,
     key,
+    knob_key,
+    law_key,
     to_si,
 )
 from graben.schemas.scene import InputFile, Model, Scene
 from graben.schemas.scenes.blocks_loading import InSitu, Loading, Numerics, Point, Programme
+
+# The law of blocks that yield; its elastic part is that of blocks that do not.
+_knob, _law = partial(knob_key, "blocks"), partial(law_key, "mohr-coulomb")
 
 
 class Domain(Model):
@@ -88,7 +94,9 @@ class Tessellation(Model):
         ge=0,
     )
     rounding: Length = key("0.05 m", "corners are cut off at this distance from them, along both edges", gt=0)
-    zone_edge: Length | None = key(None, "longest zone edge; left out: zones span the block corners only", gt=0)
+    zone_edge: Length | None = _knob(
+        "tessellation.zone_edge", "longest zone edge; left out: zones span the block corners only", gt=0
+    )
 
 
 _GRANITE = {"friction": "51 deg", "cohesion": "55.1 MPa", "tension": "11.7 MPa", "dilation": "0 deg"}
@@ -102,18 +110,20 @@ class Rock(Model):
         "elastic",
         "elastic: zones deform; mohr-coulomb: they also yield, in shear and in tension; rigid: blocks without zones",
     )
-    young: Pressure = key("65 GPa", "Young's modulus (rigid blocks have none)", gt=0)
-    poisson: Number = key(0.2, "Poisson's ratio (rigid blocks have none)", ge=-0.99, le=0.49999)
+    young: Pressure = _law("young_modulus", "65 GPa", "Young's modulus (rigid blocks have none)")
+    poisson: Number = _law("poisson_ratio", 0.2, "Poisson's ratio (rigid blocks have none)")
     density: Density = key("2700 kg/m^3", "density", gt=0)
-    friction: Angle | None = key(
-        None, f"mohr-coulomb: friction angle; left out: {_GRANITE['friction']}", ge=0, le=1.396
+    friction: Angle | None = _law(
+        "friction_angle", None, f"mohr-coulomb: friction angle; left out: {_GRANITE['friction']}"
     )
-    cohesion: Pressure | None = key(None, f"mohr-coulomb: cohesion; left out: {_GRANITE['cohesion']}", ge=0)
-    tension: Pressure | None = key(
-        None, f"mohr-coulomb: tensile strength, cut at the cone's apex; left out: {_GRANITE['tension']}", ge=0
+    cohesion: Pressure | None = _law("cohesion", None, f"mohr-coulomb: cohesion; left out: {_GRANITE['cohesion']}")
+    tension: Pressure | None = _law(
+        "tensile_strength",
+        None,
+        f"mohr-coulomb: tensile strength, cut at the cone's apex; left out: {_GRANITE['tension']}",
     )
-    dilation: Angle | None = key(
-        None, f"mohr-coulomb: dilation angle, at most friction; left out: {_GRANITE['dilation']}", ge=0, le=1.396
+    dilation: Angle | None = _law(
+        "dilation_angle", None, f"mohr-coulomb: dilation angle, at most friction; left out: {_GRANITE['dilation']}"
     )
 
     @property

@@ -190,14 +190,14 @@ class Programme(Model):
     excavations: list[Excavation] = key([], "blocks taken out at a time (repeatable)", max_length=10_000)
     end: Time = key("100 s", "time of rise after which the run ends without failure (waiting not counted)", gt=0)
     save_every: Time = key("4 s", "time of rise between saved states", gt=0)
-    calm: Number = key(
-        5e-3,
+    calm: Number = _knob(
+        "programme.calm",
         "loads rise while the mean unbalanced force over the mean zone force is below this, else they wait",
         ge=1e-12,
         le=1,
     )
-    patience: Integer = key(
-        8000,
+    patience: Integer = _knob(
+        "programme.patience",
         "steps of waiting after which the rock has failed, if the loaded ground still sinks faster than at first; "
         "four times as many if it does not",
         ge=1000,
@@ -220,8 +220,8 @@ class Numerics(Model):
         gt=100,
         le=10**12,
     )
-    force_check: Number | None = key(
-        None,
+    force_check: Number | None = _knob(
+        "numerics.force_check",
         "loading slows down and speeds up so that lateral stress inside over applied, and bottom over top reaction, "
         "stay this close to 1; left out: the same speed throughout",
         ge=1e-6,

@@ -110,8 +110,8 @@ class ParticlesScene(Scene):
     """A bed of grains: settle, press, count the grains that push on the floor."""
 
     kind: Literal["particles"]
-    beds: Integer = key(
-        1, "beds with seeds seed, seed + 1, ...; their scatter gives the confidence interval", ge=1, le=100_000
+    beds: Integer = _knob(
+        "beds", "beds with seeds seed, seed + 1, ...; their scatter gives the confidence interval", ge=1, le=100_000
     )
     box: Box = key(default_factory=Box, description="the box")
     grains: tuple[GrainSize, ...] = key(

@@ -57,8 +57,8 @@ class Mesh(Model):
     """Bricks: fine under the path, growing outside."""
 
     size: Length = key("1.5 um", "edge under the path at standard fidelity", gt=0)
-    growth: Number = key(1.25, "ratio of neighbouring edges outside the fine range", ge=1, le=2)
-    growth_depth: Number = key(1.12, "the same from the surface down", ge=1, le=2)
+    growth: Number = _knob("mesh.growth", "ratio of neighbouring edges outside the fine range", ge=1, le=2)
+    growth_depth: Number = _knob("mesh.growth_depth", "the same from the surface down", ge=1, le=2)
     draft_factor: Number = key(_SIZE.draft.factor, "factor of the edge at draft fidelity", ge=1, le=1e3)
     reference_factor: Number = key(_SIZE.reference.factor, "factor of the edge at reference fidelity", ge=1e-3, le=1)
 
@@ -110,7 +110,9 @@ class Numerics(Model):
         "numerics.floor", "share of the first step below which an element gets mass instead", ge=1e-6, le=1
     )
     mass_cap: Number = key(0.05, "the run stops when added mass exceeds this share of the specimen's", ge=0, le=1e6)
-    refresh: Integer = key(25, "steps between refreshes of the step, of removal and of the history", ge=1, le=500)
+    refresh: Integer = _knob(
+        "numerics.refresh", "steps between refreshes of the step, of removal and of the history", ge=1, le=500
+    )
     hourglass: Number = _knob(
         "numerics.hourglass", "hourglass stiffness over the elastic bending stiffness", ge=0, le=1
     )
