@@ -13,8 +13,8 @@ import time
 import numpy as np
 
 from graben.mechanics.fem.body import Body, Material, make_body
+from graben.mechanics.fem.loads import body_force
 from graben.mechanics.fem.newton import NewtonOptions, equilibrate, factorise
-from graben.mechanics.fem.quads import body_force
 from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.meshes.mapped import mapped_mesh
 from graben.mechanics.meshes.sizing import SizeField

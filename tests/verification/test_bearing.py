@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from graben.mechanics.fem.body import Material, make_body
+from graben.mechanics.fem.loads import edge_traction
 from graben.mechanics.fem.march import StepOptions, march
 from graben.mechanics.fem.newton import NewtonOptions
-from graben.mechanics.fem.quads import edge_traction
 from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.meshes.mapped import mapped_mesh
 from graben.mechanics.meshes.sizing import SizeField

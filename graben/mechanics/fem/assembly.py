@@ -30,7 +30,7 @@ def assemble(
 
     Parameters
     ----------
-    dofs (e, 8); strain_matrix (e, 4, 3, 8); weight (e, 4); length (e,): see `quads.QuadElements`
+    dofs (e, 8): see `body.Body`; strain_matrix (e, 4, 3, 8), weight (e, 4), length (e,): `PlaneElements`
     material : (e,) row of `law_ids` (m,) and `parameters` (m, k)
     increment : (2 n,) displacement since the last converged state, m
     stress_old (e, 4, 4), state_old (e, 4, s) : converged values; stress, state : overwritten, same shapes

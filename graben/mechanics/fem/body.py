@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from graben.errors import Refused
+from graben.mechanics.elements import quad4
+from graben.mechanics.elements.plane_strain import PlaneElements, plane_elements
 from graben.mechanics.fem.assembly import assemble
 from graben.mechanics.fem.pattern import Block, Pattern, block_of, pattern_of
-from graben.mechanics.fem.quads import QuadElements, quad_elements
 from graben.mechanics.meshes.mesh2d import QuadMesh
 
 _NO_VALUES = np.zeros(0)
@@ -54,13 +55,15 @@ class Body:
 
     Attributes
     ----------
+    dofs : (e, 8) degrees of freedom of each element
     material_row : (e,) which of the materials fills each element
     law_ids (m,), parameters (m, k), initial_state (m, s) : the materials, padded with zeros to a common width
     fixed, free : ascending degrees of freedom (2 * node + axis) with and without prescribed displacement
     """
 
     mesh: QuadMesh
-    elements: QuadElements
+    elements: PlaneElements
+    dofs: np.ndarray
     pattern: Pattern
     material_row: np.ndarray
     law_ids: np.ndarray
@@ -84,7 +87,7 @@ class Body:
         values = np.empty(len(self.pattern.indices)) if stiffness else _NO_VALUES
         el = self.elements
         failed = assemble(
-            el.dofs,
+            self.dofs,
             el.strain_matrix,
             el.weight,
             el.length,
@@ -104,7 +107,7 @@ class Body:
 
     def strain(self, displacement: np.ndarray) -> np.ndarray:
         """Strain (e, 4, 4) at the Gauss points, components (xx, yy, zz, xy), tensor shear strain."""
-        u = displacement[self.elements.dofs]
+        u = displacement[self.dofs]
         in_plane = np.einsum("egic,ec->egi", self.elements.strain_matrix, u)
         strain = np.zeros((*in_plane.shape[:2], 4))
         strain[..., 0], strain[..., 1], strain[..., 3] = (
@@ -149,15 +152,19 @@ def make_body(
     rows = np.ascontiguousarray(rows, dtype=np.int64)
     if rows.shape != (len(mesh.quads),) or rows.min() < 0 or rows.max() >= len(materials):
         raise ValueError(f"material_row must name one of {len(materials)} materials for each element")
-    elements = quad_elements(mesh, mean_dilatation)
+    _, derivatives = quad4.shape_functions(quad4.GAUSS)
+    elements = plane_elements(mesh.points[mesh.quads], derivatives, mean_dilatation)
     elements = replace(elements, length=np.maximum(elements.length, least_length))
-    pattern = pattern_of(elements.dofs, size)
+    dofs = np.stack([2 * mesh.quads, 2 * mesh.quads + 1], axis=-1).reshape(-1, 8)
+    dofs = np.ascontiguousarray(dofs, dtype=np.int64)
+    pattern = pattern_of(dofs, size)
     fixed_dofs, free_dofs = np.flatnonzero(fixed), np.flatnonzero(~fixed)
     if not len(free_dofs):
         raise Refused("every degree of freedom is prescribed")
     return Body(
         mesh=mesh,
         elements=elements,
+        dofs=dofs,
         pattern=pattern,
         material_row=rows,
         law_ids=np.array([m.law_id for m in materials], dtype=np.int64),

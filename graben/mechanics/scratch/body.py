@@ -8,10 +8,10 @@ import numpy as np
 
 from graben.errors import NumericsFailed
 from graben.mechanics.compiled import kernel
+from graben.mechanics.elements.hex8 import shape_gradient, volume_gradient
 from graben.mechanics.scratch.contact import sphere_contact
 from graben.mechanics.scratch.eight_points import forces_eight_points
 from graben.mechanics.scratch.frame import Snapshot, stress_in_space
-from graben.mechanics.scratch.geometry import shape_gradient, volume_gradient
 from graben.mechanics.scratch.mesh import Floats, HexMesh
 from graben.mechanics.scratch.motion import tip_position
 from graben.mechanics.scratch.one_point import EXTERNAL, KINETIC, LEDGER_SIZE, forces_one_point

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from graben.mechanics.compiled import kernel
+from graben.mechanics.elements.hex8 import shape_gradient, volume_gradient
 from graben.mechanics.materials.laws import update
-from graben.mechanics.scratch.geometry import shape_gradient, volume_gradient
 from graben.mechanics.scratch.one_point import INTERNAL, VISCOUS
 from graben.mechanics.scratch.rotation import follow_rotation, midstep_increment, rotate_stress
 

@@ -12,16 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graben.errors import Refused
+from graben.mechanics.elements.hex8 import CORNERS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-# Corner offsets of a hexahedron in the order of VTK: bottom face counter-clockwise, then the top face.
-CORNERS = np.array(
-    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=np.int64
-)
-# Faces as local nodes, counter-clockwise seen from outside.
-FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]], dtype=np.int64)
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from graben.mechanics.compiled import kernel
+from graben.mechanics.elements.hex8 import hourglass_shares, volume_gradient
 from graben.mechanics.materials.laws import update
-from graben.mechanics.scratch.geometry import hourglass_shares, volume_gradient
 from graben.mechanics.scratch.rotation import follow_rotation, midstep_increment, rotate_stress
 
 # Where each energy stands in the ledger [J] (half model).

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from graben.mechanics.compiled import kernel
-from graben.mechanics.scratch.geometry import largest_face
+from graben.mechanics.elements.hex8 import largest_face
 from graben.mechanics.scratch.one_point import ADDED_MASS, DAMPING
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from graben.mechanics.scratch.mesh import FACES, Floats, HexMesh, Ints
+from graben.mechanics.elements.hex8 import FACES
+from graben.mechanics.scratch.mesh import Floats, HexMesh, Ints
 
 
 def exposed_faces(mesh: HexMesh, alive: NDArray[np.int64]) -> tuple[Ints, Ints]:

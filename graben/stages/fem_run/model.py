@@ -9,7 +9,7 @@ import numpy as np
 from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.fem.body import Body, Material, make_body
 from graben.mechanics.fem.collapse import RisingPressure
-from graben.mechanics.fem.quads import body_force, edge_traction
+from graben.mechanics.fem.loads import body_force, edge_traction
 from graben.mechanics.meshes.mesh2d import QuadMesh
 from graben.schemas.scenes.fem import FemScene
 

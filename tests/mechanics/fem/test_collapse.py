@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from graben.mechanics.fem.collapse import LoadCurve, Overload, RisingPressure
+from graben.mechanics.fem.loads import edge_traction
 from graben.mechanics.fem.march import StepOptions, advance, at_rest
 from graben.mechanics.fem.newton import NewtonOptions
-from graben.mechanics.fem.quads import edge_traction
 
 # A segment of 2 m whose settlement is that of one node: 1 MPa at time 0, 0.5 MPa/s.
 PRESSURE = RisingPressure(np.array([0.0, -1.0]), 2.0, 1e6, 0.5e6)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from graben.mechanics.elements.quad4 import GAUSS, shape_functions
 from graben.mechanics.fem.newton import NewtonOptions, equilibrate
-from graben.mechanics.fem.quads import GAUSS, shape_functions
 from graben.mechanics.meshes.mesh2d import QuadMesh
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from graben.mechanics.fem.loads import body_force, edge_traction
 from graben.mechanics.fem.march import StepOptions, advance, at_rest, march
 from graben.mechanics.fem.newton import NewtonOptions, equilibrate
-from graben.mechanics.fem.quads import body_force, edge_traction
 from graben.mechanics.fem.stability import softest_stiffness
 from graben.mechanics.materials.point import follow
 

@@ -1,4 +1,4 @@
-"""Element kernels against slow, obvious references: volumes, patch test, rotation, forces."""
+"""Forces of hexahedra against slow, obvious references: patch test, rotation, hourglass forces, work."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from graben.mechanics.elements.hex8 import CORNERS, HOURGLASS, shape_gradient
 from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.scratch.body import elastic_moduli, reference_gradients
 from graben.mechanics.scratch.eight_points import forces_eight_points
 from graben.mechanics.scratch.frame import stress_in_space
-from graben.mechanics.scratch.geometry import HOURGLASS, largest_face, shape_gradient, volume_gradient
-from graben.mechanics.scratch.mesh import CORNERS, brick
+from graben.mechanics.scratch.mesh import brick
 from graben.mechanics.scratch.one_point import HOURGLASS_WORK, INTERNAL, LEDGER_SIZE, forces_one_point
 
 YOUNG, NU = 210e9, 0.33
@@ -68,24 +68,6 @@ def turn(axis: np.ndarray, angle: float) -> np.ndarray:
     k = axis / np.linalg.norm(axis)
     w = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
     return np.eye(3) + np.sin(angle) * w + (1 - np.cos(angle)) * w @ w
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_volume_and_its_gradient_are_those_of_gauss_integration(seed: int) -> None:
-    xe, b, g = distorted(seed), np.empty((8, 3)), np.empty((8, 3))
-    volume = volume_gradient(xe, b)
-    total, mean = 0.0, np.zeros((8, 3))
-    for point in GAUSS:  # two points a direction are exact for a trilinear volume
-        weight = shape_gradient(xe, *point, g)
-        total += weight
-        mean += weight * g
-    assert volume == pytest.approx(total, rel=1e-13)
-    np.testing.assert_allclose(b, mean, atol=1e-13)
-    np.testing.assert_allclose(xe.T @ b, volume * np.eye(3), atol=1e-13)
-
-
-def test_largest_face_of_a_brick() -> None:
-    assert largest_face(CORNERS * np.array([1.0, 2.0, 3.0])) == pytest.approx(6.0)
 
 
 @pytest.mark.parametrize("count", [1, 8])

@@ -1,10 +1,9 @@
-"""The element: rigid motion, patch test, loads, stiffness against a plain reference."""
+"""A body of quads: rigid motion, patch test, stiffness against a plain reference."""
 
 import numpy as np
 import pytest
 
 from graben.mechanics.fem.newton import NewtonOptions, equilibrate
-from graben.mechanics.fem.quads import body_force, edge_traction, quad_elements
 
 TIGHT = NewtonOptions(tolerance=1e-11)
 
@@ -78,34 +77,3 @@ def test_patch_test_an_affine_outline_gives_an_affine_inside(grid, body, materia
     lame, mu = 2e9 * poisson / ((1 + poisson) * (1 - 2 * poisson)), 1e9 / (1 + poisson)
     stress = [lame * 3e-4 + 2 * mu * 1e-3, lame * 3e-4 - 2 * mu * 7e-4, lame * 3e-4, 2 * mu * 1e-4]
     np.testing.assert_allclose(step.state.stress, np.broadcast_to(stress, strain.shape), rtol=1e-8, atol=1e-3)
-
-
-def test_weight_is_shared_out_whole_and_without_moment(grid):
-    mesh = grid(3.0, 2.0, 5, 4, bend=0.3)
-    force = body_force(mesh, 2500.0, np.array([1.0, -9.81])).reshape(-1, 2)
-    np.testing.assert_allclose(force.sum(axis=0), [2500 * 6.0, -9.81 * 2500 * 6.0])
-    arm = mesh.points - [1.5, 1.0]
-    moment = arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]
-    np.testing.assert_allclose(moment.sum(), 0.0, atol=1e-9 * np.abs(moment).sum())
-
-
-def test_an_edge_load_may_end_inside_elements(grid):
-    mesh = grid(3.0, 2.0, 5, 4)
-    force, length = edge_traction(mesh, np.array([0.4, 2.0]), np.array([1.7, 2.0]))
-    force = force.reshape(-1, 2)
-    np.testing.assert_allclose(length, 1.3)
-    np.testing.assert_allclose(force.sum(axis=0), [0.0, -1.3], atol=1e-15)  # a pressure pushes into the body
-    np.testing.assert_allclose((mesh.points[:, 0] * force[:, 1]).sum(), -1.3 * 1.05)
-    tangential, _ = edge_traction(mesh, np.array([1.7, 2.0]), np.array([0.4, 2.0]), np.array([3.0, 0.0]))
-    np.testing.assert_allclose(tangential.reshape(-1, 2).sum(axis=0), [3.9, 0.0])
-    with pytest.raises(ValueError, match=r"covers 2 m of the 2\.5 m"):
-        edge_traction(mesh, np.array([1.0, 2.0]), np.array([3.5, 2.0]))
-    with pytest.raises(ValueError, match="covers 0 m"):
-        edge_traction(mesh, np.array([0.0, 1.0]), np.array([3.0, 1.0]))
-
-
-def test_a_turned_over_element_is_refused(grid):
-    mesh = grid(1.0, 1.0, 2, 2)
-    mesh.points[4] = [2.0, 2.0]
-    with pytest.raises(ValueError, match="turned over or not convex"):
-        quad_elements(mesh)

@@ -1,4 +1,4 @@
-"""Geometry of a trilinear hexahedron in closed form: volume, its gradient, faces, and the step that it allows."""
+"""8-node hexahedron: trilinear shape functions, volume and mean gradient in closed form, faces, hourglass modes."""
 
 from __future__ import annotations
 
@@ -6,6 +6,12 @@ import numpy as np
 
 from graben.mechanics.compiled import kernel
 
+# Corner offsets in the order of VTK: bottom face counter-clockwise, then the top face.
+CORNERS = np.array(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=np.int64
+)
+# Faces as local nodes, counter-clockwise seen from outside.
+FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]], dtype=np.int64)
 # Hourglass base vectors of the hexahedron at its corners: xi eta, eta zeta, zeta xi, xi eta zeta.
 HOURGLASS = np.array(
     [
@@ -15,9 +21,6 @@ HOURGLASS = np.array(
         [-1, 1, -1, 1, 1, -1, 1, -1],
     ],
     dtype=np.float64,
-)
-FACE_NODES = np.array(
-    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]], dtype=np.int64
 )
 
 
@@ -80,7 +83,7 @@ def largest_face(xe):
     """Area [m2] of the largest face of a hexahedron xe (8, 3), from the diagonals of each face."""
     largest = 0.0
     for f in range(6):
-        n0, n1, n2, n3 = FACE_NODES[f, 0], FACE_NODES[f, 1], FACE_NODES[f, 2], FACE_NODES[f, 3]
+        n0, n1, n2, n3 = FACES[f, 0], FACES[f, 1], FACES[f, 2], FACES[f, 3]
         ax, ay, az = xe[n2, 0] - xe[n0, 0], xe[n2, 1] - xe[n0, 1], xe[n2, 2] - xe[n0, 2]
         bx, by, bz = xe[n3, 0] - xe[n1, 0], xe[n3, 1] - xe[n1, 1], xe[n3, 2] - xe[n1, 2]
         cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
