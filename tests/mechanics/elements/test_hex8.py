@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from graben.mechanics.elements.hex8 import CORNERS, largest_face, shape_gradient, volume_gradient
+from graben.mechanics.elements.hex8 import (
+    CORNERS,
+    FACES,
+    HOURGLASS,
+    hourglass_shares,
+    largest_face,
+    shape_gradient,
+    volume_gradient,
+)
 
 ROOT = 1.0 / np.sqrt(3.0)
 GAUSS = [(a, b, c) for c in (-ROOT, ROOT) for b in (-ROOT, ROOT) for a in (-ROOT, ROOT)]
@@ -27,3 +35,16 @@ def test_volume_and_its_gradient_are_those_of_gauss_integration(seed: int) -> No
 
 def test_largest_face_of_a_brick() -> None:
     assert largest_face(CORNERS * np.array([1.0, 2.0, 3.0])) == pytest.approx(6.0)
+
+
+def test_faces_close_the_cube_and_look_outwards() -> None:
+    corners = CORNERS[FACES].astype(float)
+    area = 0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    np.testing.assert_array_equal(area.sum(axis=0), 0.0)
+    assert (np.einsum("fi,fi->f", area, corners.mean(axis=1) - 0.5) == 0.5).all()
+
+
+def test_hourglass_shares_are_projections_on_the_base_vectors() -> None:
+    w, out = np.random.default_rng(1).uniform(-1, 1, (8, 3)), np.empty((4, 3))
+    hourglass_shares(w, out)
+    np.testing.assert_allclose(out, HOURGLASS @ w, atol=1e-14)
