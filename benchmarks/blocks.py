@@ -18,7 +18,7 @@ import numpy as np
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.contact.sleeping import AWAY, CLOSED
 from graben.mechanics.blocks.engine.model import BlockModel
-from graben.mechanics.blocks.loading.compression import consolidate
+from graben.mechanics.blocks.loading.biaxial import consolidate
 from graben.mechanics.blocks.shape.bodies import build_bodies
 from graben.mechanics.blocks.shape.tessellation import voronoi_blocks
 from graben.mechanics.blocks.zones.plastic import ELASTIC, PlasticZones, Strength

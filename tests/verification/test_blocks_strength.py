@@ -5,7 +5,7 @@ import pytest
 
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
-from graben.mechanics.blocks.loading.programme import pressure_forces
+from graben.mechanics.blocks.loading.loads import pressure_forces
 from graben.mechanics.blocks.shape.bodies import build_bodies
 from graben.mechanics.blocks.shape.joint_sets import JointSet, cut_by_sets
 from graben.mechanics.blocks.shape.mending import mend

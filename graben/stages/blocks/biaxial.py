@@ -1,87 +1,71 @@
-"""Biaxial compression of a rectangle of blocks: consolidation, then the top moves down."""
+"""Biaxial compression as a scene's [loading] describes it: the test, and what is reported of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, fields
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from graben.mechanics.blocks.engine.model import BlockModel
-from graben.mechanics.blocks.loading.compression import Courses, compress, consolidate, rectangle_sides
+from graben.mechanics.blocks.loading.biaxial import Biaxial, Courses, rectangle_sides
 from graben.mechanics.blocks.loading.courses import Course
-from graben.mechanics.blocks.loading.pace import ForceCheck, Pace
+from graben.mechanics.blocks.loading.pace import ForceCheck
 from graben.mechanics.blocks.record.history import History, mean_stress
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.schemas.scenes.blocks_loading import Loading
-from graben.stages.blocks.checkpoint import refuse_unlike
+from graben.stages.blocks.report import energy_error, energy_measure, kinetic_measure, kinetic_share, ratio
 from graben.stages.shared.measures import Measure, number
-from graben.stages.shared.record import Progress
 
 
-class Biaxial:
-    """The test that a scene's [loading] describes."""
+def biaxial(scene: BlocksScene, model: BlockModel, steps: int) -> Biaxial:
+    """The test. Refused where the domain is no upright rectangle."""
+    loading, numerics = scene.loading, scene.numerics
+    check = _force_check(scene, steps)
+    return Biaxial(
+        model,
+        pressure=-loading.confining_pressure,
+        vertical=-loading.confining_pressure * loading.vertical_ratio,
+        speed=-loading.speed,
+        steps=steps,
+        states=loading.states,
+        tolerance=numerics.consolidation_tolerance,
+        courses=_courses(loading, loading.duration / steps, check is not None),
+        stop_loose=numerics.stop_loose_blocks,
+        check=check,
+    )
 
-    ERRORS = (
+
+def _force_check(scene: BlocksScene, steps: int) -> ForceCheck | None:
+    n = scene.numerics
+    if n.force_check is None:
+        return None
+    return ForceCheck(n.force_check, steps / (n.most_steps or 8 * steps), steps / (n.least_steps or steps))
+
+
+def _courses(loading: Loading, dt: float, always: bool) -> Courses | None:
+    """Courses over steps of dt; None where speed and pressure are steady, unless they are wanted always."""
+    if loading.speed_course is None and loading.confining_course is None and not always:
+        return None
+    down = loading.speed_course or [(0.0, 0.0), (0.01 * loading.duration, loading.speed)]
+    pressure = loading.confining_course
+    return Courses(
+        Course([(time, -speed) for time, speed in down]).in_steps(dt),
+        None if pressure is None else Course(pressure).in_steps(dt),
+    )
+
+
+class BiaxialReport:
+    """See `Report`."""
+
+    errors: ClassVar[tuple[str, ...]] = (
         "energy_error",
         "kinetic_over_stored_energy",
         "lateral_over_applied_stress",
         "bottom_over_top_reaction",
     )
 
-    def __init__(self, scene: BlocksScene, model: BlockModel, steps: int) -> None:
-        rectangle_sides(model.bodies.outline)  # refuses any other outline before work begins
-        self.scene, self.model, self.steps = scene, model, steps
-        self.rest = np.zeros(2)  # unbalanced force ratio of consolidation, its steps
-        self.check = _force_check(scene, steps)
-        self.pace = None if self.check is None else Pace()
-        self.courses = _courses(scene.loading, scene.loading.duration / steps, self.check is not None)
-
-    def begin(self, progress: Progress) -> None:
-        """Consolidate."""
-        progress(0.0, "consolidation")
-        pressure = self.scene.loading.confining_pressure
-        ratio = consolidate(
-            self.model,
-            -pressure,
-            -pressure * self.scene.loading.vertical_ratio,
-            tolerance=self.scene.numerics.consolidation_tolerance,
-        )
-        self.rest = np.array([ratio, self.model.steps_done])
-
-    def go_on(self, history: History, save: Callable[[], None], progress: Progress) -> None:
-        """Compress from the last saved state to the end."""
-        states = self.scene.loading.states
-
-        def saved(k: int, _: BlockModel) -> None:
-            save()
-            progress(k / (states - 1), f"state {k} of {states - 1}")
-
-        speed, behind = -self.scene.loading.speed, len(history.time)
-        loose = self.scene.numerics.stop_loose_blocks
-        compress(
-            self.model,
-            speed,
-            self.steps,
-            states,
-            saved,
-            saved=behind,
-            courses=self.courses,
-            stop_loose=loose,
-            paced=None if self.pace is None or self.check is None else (self.pace, self.check),
-        )
-
-    def state(self) -> dict[str, np.ndarray]:
-        """What a checkpoint must hold beside the model."""
-        pace = {} if self.pace is None else {f"pace_{k}": np.array(v) for k, v in asdict(self.pace).items()}
-        return {"rest": self.rest, **pace}
-
-    def bring_back(self, state: dict[str, np.ndarray]) -> None:
-        refuse_unlike(state, self.state())
-        self.rest = state["rest"]
-        if self.pace is not None:
-            self.pace = Pace(**{f.name: state[f"pace_{f.name}"].item() for f in fields(Pace)})
+    def __init__(self, scene: BlocksScene, test: Biaxial) -> None:
+        self.scene, self.test, self.model = scene, test, test.model
 
     def arrays(self, history: History) -> dict[str, np.ndarray]:
         """Arrays of the artifact that only this test has."""
@@ -101,11 +85,12 @@ class Biaxial:
 
     def _paced(self) -> dict[str, float]:
         """Steps of loading, and the force check along them."""
-        if self.pace is None:
+        pace = self.test.pace
+        if pace is None:
             return {}
-        mean = self.pace.summed / max(self.pace.looks, 1)
-        steps = self.model.steps_done - int(self.rest[1])
-        return {"loading_steps": steps, "force_check_worst": self.pace.worst, "force_check_mean": mean}
+        mean = pace.summed / max(pace.looks, 1)
+        steps = self.model.steps_done - int(self.test.rest[1])
+        return {"loading_steps": steps, "force_check_worst": pace.worst, "force_check_mean": mean}
 
     def headline(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         """Peak of the top wall's mean stress (Pa, compression negative), nominal strain there, error measures."""
@@ -155,57 +140,3 @@ class Biaxial:
                 least=0.9,
             ),
         ]  # fmt: skip
-
-
-def _force_check(scene: BlocksScene, steps: int) -> ForceCheck | None:
-    n = scene.numerics
-    if n.force_check is None:
-        return None
-    return ForceCheck(n.force_check, steps / (n.most_steps or 8 * steps), steps / (n.least_steps or steps))
-
-
-def _courses(loading: Loading, dt: float, always: bool) -> Courses | None:
-    """Courses over steps of dt; None where speed and pressure are steady, unless they are wanted always."""
-    if loading.speed_course is None and loading.confining_course is None and not always:
-        return None
-    down = loading.speed_course or [(0.0, 0.0), (0.01 * loading.duration, loading.speed)]
-    pressure = loading.confining_course
-    return Courses(
-        Course([(time, -speed) for time, speed in down]).in_steps(dt),
-        None if pressure is None else Course(pressure).in_steps(dt),
-    )
-
-
-def energy_measure(headline: dict[str, Any]) -> Measure:
-    """The run stops at numerics.energy_limit; half of its default is told."""
-    return Measure(
-        "energy_error", headline["energy_error"], 0.025,
-        "the energy ledger is off by {percent} of the work done; take more steps (numerics.steps)",
-    )  # fmt: skip
-
-
-def kinetic_measure(headline: dict[str, Any]) -> Measure:
-    """Quasi-static tests keep a few percent of the energy in motion."""
-    return Measure(
-        "kinetic_over_stored_energy", headline["kinetic_over_stored_energy"], 0.05,
-        "kinetic energy is {percent} of the stored one (5 % is the most of a quasi-static test): the load comes too "
-        "fast; take more steps (numerics.steps) or a finer fidelity",
-    )  # fmt: skip
-
-
-def ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
-    """part / whole, 0 where both are."""
-    return np.divide(part, np.where((part == 0.0) & (whole == 0.0), 1.0, whole))
-
-
-def energy_error(arrays: dict[str, np.ndarray]) -> float:
-    """Largest error of the ledger over the work done and the energy stored."""
-    stored = arrays["energy_strain"] + arrays["energy_joint"]
-    work = abs(arrays["energy_boundary"]) + abs(arrays["energy_external"]) + stored
-    return float(ratio(np.abs(arrays["energy_error"]), work).max())
-
-
-def kinetic_share(arrays: dict[str, np.ndarray]) -> np.ndarray:
-    """Kinetic over stored energy per state; what flies loose counts in neither."""
-    moving = arrays["energy_kinetic"] - arrays["energy_kinetic_loose"]
-    return ratio(moving, arrays["energy_strain"] + arrays["energy_joint"])

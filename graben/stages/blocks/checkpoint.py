@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 import graben
-from graben.errors import BadInput, Fault, Refused
+from graben.errors import BadInput, Fault
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.record import snapshot
 from graben.mechanics.blocks.record.history import History
@@ -94,17 +93,3 @@ def read(output: Path, scene: Scene) -> dict[str, Arrays]:
         if part in parts:
             parts[part][rest] = values
     return parts
-
-
-def refuse_unlike(state: Arrays, own: Arrays, changing: Iterable[str] = ()) -> None:
-    """Refused where a state of the loading is not of the shapes and kinds of its own first one.
-
-    changing : names whose first length changes in a run
-    """
-    for name, values in own.items():
-        found, like = state.get(name), np.asarray(values)
-        skip = 1 if name in changing else 0
-        if found is None or found.dtype.kind != like.dtype.kind or found.shape[skip:] != like.shape[skip:]:
-            raise Refused(f"test.{name}: shape {like.shape} of {like.dtype}")
-        if found.dtype.kind == "f" and np.isnan(found).any():
-            raise Refused(f"test.{name}: numbers")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault, Refused
-from graben.mechanics.blocks.loading.compression import rectangle_sides
+from graben.mechanics.blocks.loading.biaxial import rectangle_sides
 from graben.mechanics.blocks.shape import coverage
 from graben.mechanics.blocks.shape.joint_sets import JointSet, cut_by_sets
 from graben.mechanics.blocks.shape.mending import mend

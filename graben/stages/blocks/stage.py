@@ -9,24 +9,22 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault, MachineFailed, NumericsFailed, Refused
-from graben.mechanics.blocks.engine.model import BlockModel, Damping
-from graben.mechanics.blocks.loading.in_situ import InSitu, put_in
+from graben.mechanics.blocks.engine.model import BlockModel
+from graben.mechanics.blocks.loading.protocol import Loading
 from graben.mechanics.blocks.record import snapshot
 from graben.mechanics.blocks.record.history import History
-from graben.mechanics.blocks.shape.bodies import build_bodies
-from graben.mechanics.blocks.shape.tessellation import Tessellation
-from graben.mechanics.blocks.zones.plastic import Strength
 from graben.schemas.artifact import write_artifact
 from graben.schemas.files import together
 from graben.schemas.layouts.blocks import LAYOUT
 from graben.schemas.outputs import CHECKPOINT, PARTIAL, SERIES, Outputs, beside
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.stages.blocks import checkpoint as blocks_checkpoint
-from graben.stages.blocks.biaxial import Biaxial
+from graben.stages.blocks.biaxial import BiaxialReport, biaxial
 from graben.stages.blocks.geometry import Ground, lay_out
-from graben.stages.blocks.joints import joints_of_sets
+from graben.stages.blocks.model import block_model
 from graben.stages.blocks.output import write_vtk
-from graben.stages.blocks.programme import Rising
+from graben.stages.blocks.programme import ProgrammeReport, programme
+from graben.stages.blocks.report import Report
 from graben.stages.blocks.sizes import sizes_of, steps_of
 from graben.stages.shared.estimate import Estimate, refuse_too_large
 from graben.stages.shared.last_good import keep_by, keeps_last_good, write_whole
@@ -51,7 +49,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
 
     Returns
     -------
-    headline numbers of the test, see `Biaxial.headline` and `Rising.headline`
+    headline numbers of the test, see `BiaxialReport.headline` and `ProgrammeReport.headline`
 
     Raises
     ------
@@ -59,12 +57,13 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
     written as NAME.partial.nc beside the output.
     """
     prepared = prepare(scene)
-    ground, model, test = prepared.ground, prepared.model, prepared.test
+    ground, model, test, report = prepared.ground, prepared.model, prepared.test, prepared.report
     record = Record.begin(scene)
     parts = blocks_checkpoint.read(output, scene) if restart else None
     progress(0.0, f"{ground.blocks.size} blocks come to rest")
     if parts is None:
-        test.begin(progress)
+        for moment in test.begin():
+            progress(moment.fraction, moment.words)
     history = History(model, scene.output.balance)
     if parts is not None:
         _bring_back(blocks_checkpoint.path_for(output), model, test, history, parts)
@@ -75,24 +74,24 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
             return None
         history.cut(keeper.states)
         path = beside(output, PARTIAL)
-        write_artifact(path, LAYOUT, ground.placed(_arrays(model, history, test)), record, partial=why)
+        write_artifact(path, LAYOUT, ground.placed(_arrays(model, history, report)), record, partial=why)
         return path
 
     keep_by(keep)
 
-    def save() -> None:
-        history.save()
-        _check_ledger(history, scene.numerics.energy_limit, model.steps_done)
-        keeper.keep(model, history, test.state())
-
     try:
-        test.go_on(history, save, progress)
+        for moment in test.run():
+            if moment.save:
+                history.save()
+                _check_ledger(history, scene.numerics.energy_limit, model.steps_done)
+                keeper.keep(model, history, test.state())
+            progress(moment.fraction, moment.words)
     except (NumericsFailed, KeyboardInterrupt):
         keeper.stopped()
         raise
-    arrays = _arrays(model, history, test)
-    headline = test.headline(arrays) | ground.mended
-    headline["warnings"] = record.warnings = warnings_of(test.measures(headline))
+    arrays = _arrays(model, history, report)
+    headline = report.headline(arrays) | ground.mended
+    headline["warnings"] = record.warnings = warnings_of(report.measures(headline))
     arrays = ground.placed(arrays)
     record.cost |= {
         "steps": model.steps_done,
@@ -105,7 +104,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         "mass_ratio_max": float(model.mass_ratio.max()),
         "consolidation_unbalanced_force_ratio": float(test.rest[0]),
         "largest_overlap_m": max(history.overlap),
-        **{name: headline[name] for name in (*test.ERRORS, *_PACED) if name in headline},
+        **{name: headline[name] for name in (*report.errors, *_PACED) if name in headline},
         **{f"block_{name}": value for name, value in ground.blocks.statistics().items()},
         **ground.mended,
         **({"local_origin_m": ground.origin.tolist()} if ground.origin.any() else {}),
@@ -128,7 +127,8 @@ class Prepared:
 
     ground: Ground
     model: BlockModel
-    test: Biaxial | Rising
+    test: Loading
+    report: Report
     sizes: list[Estimate]
 
 
@@ -139,83 +139,39 @@ def prepare(scene: BlocksScene) -> Prepared:
     ------
     BadInput : the scene is too large, or the mechanics refuse it
     """
-    file, programme = scene.source.path, scene.programme
+    file, biaxial_test = scene.source.path, scene.programme is None
     sizes = sizes_of(scene)
     refuse_too_large(file, sizes)
-    duration = scene.loading.duration if programme is None else programme.end
-    gravity = (0.0, 0.0) if programme is None else (programme.horizontal, programme.vertical)
     ground = lay_out(scene)
     scene = ground.scene
     steps = steps_of(scene, ground.blocks.size)
-    if programme is None and scene.loading.states > steps + 1:
+    if biaxial_test and scene.loading.states > steps + 1:
         expected = f"at most {steps + 1}: one state a step"
         raise BadInput(Fault(str(file), "loading.states", str(scene.loading.states), expected))
     try:
-        model = _model(scene, ground.blocks, duration / steps, gravity)
-        _put_stress_in(scene, model)
-        test = Biaxial(scene, model, steps) if programme is None else Rising(scene, model, steps)
+        model = block_model(scene, ground.blocks, steps)
+        test, report = _test(scene, model, steps)
     except Refused as error:
-        key = "loading" if programme is None else "programme"
+        key = "loading" if biaxial_test else "programme"
         raise BadInput(Fault(str(file), key, "", str(error))) from error
-    return Prepared(ground, model, test, sizes)
+    return Prepared(ground, model, test, report, sizes)
 
 
-def _bring_back(
-    path: Path, model: BlockModel, test: Biaxial | Rising, history: History, parts: dict[str, Any]
-) -> None:
+def _test(scene: BlocksScene, model: BlockModel, steps: int) -> tuple[Loading, Report]:
+    if scene.programme is None:
+        compression = biaxial(scene, model, steps)
+        return compression, BiaxialReport(scene, compression)
+    rising = programme(scene, model)
+    return rising, ProgrammeReport(scene, rising)
+
+
+def _bring_back(path: Path, model: BlockModel, test: Loading, history: History, parts: dict[str, Any]) -> None:
     try:
         snapshot.bring_back(model, parts["model"])
         test.bring_back(parts["test"])
         history.bring_back(parts["history"])
     except Refused as error:
         raise BadInput(Fault(str(path), "restart", "", f"a checkpoint of this model ({error})", True)) from error
-
-
-def _model(scene: BlocksScene, tessellation: Tessellation, dt: float, gravity: tuple[float, float]) -> BlockModel:
-    bodies = build_bodies(tessellation, scene.tessellation.zone_edge)
-    joints, between = joints_of_sets(scene.joints, bodies.edge_set)
-    return BlockModel(
-        bodies,
-        young=scene.rock.young,
-        poisson=scene.rock.poisson,
-        density=scene.rock.density,
-        joint=joints[0],
-        more_joints=joints[1:],
-        edge_set=bodies.edge_set,
-        set_between=between,
-        rounding=scene.tessellation.rounding,
-        dt=dt,
-        gravity=gravity,
-        damping=_damping(scene, dt),
-        threads=scene.numerics.threads,
-        strength=Strength(*scene.rock.strength) if scene.rock.zones == "mohr-coulomb" else None,
-        rigid=scene.rock.zones == "rigid",
-    )
-
-
-def _put_stress_in(scene: BlocksScene, model: BlockModel) -> None:
-    s = scene.in_situ
-    if s is None:
-        return
-    level = float(model.bodies.outline[:, 1].max()) if s.level is None else s.level
-    stress, rise = (s.sxx, s.syy, s.sxy), (s.sxx_rise, s.syy_rise, s.sxy_rise)
-    if s.k0 is not None and scene.programme is not None:
-        weight = -scene.rock.density * scene.programme.vertical
-        stress, rise = (s.k0 * s.syy, s.syy, 0.0), (s.k0 * weight, weight, 0.0)
-    put_in(model, InSitu(stress, rise, level))
-
-
-def _damping(scene: BlocksScene, dt: float) -> Damping:
-    n = scene.numerics
-    if n.damping == "local":
-        return Damping(ratio=-1.0, local=n.damping_share or 0.0)
-    if n.damping == "viscous":
-        coefficient = n.damping_coefficient or 0.0
-        if coefficient * dt > 1.0:
-            key, value = "numerics.damping_coefficient", f"{coefficient:.4g} 1/s"
-            raise BadInput(Fault(str(scene.source.path), key, value, f"at most 1 / time step = {1.0 / dt:.4g} 1/s"))
-        return Damping(ratio=-1.0, coefficient=coefficient)
-    return Damping(ratio=n.damping_ratio)
 
 
 def _check_ledger(history: History, limit: float, step: int) -> None:
@@ -231,9 +187,9 @@ def _check_ledger(history: History, limit: float, step: int) -> None:
         )
 
 
-def _arrays(model: BlockModel, history: History, test: Biaxial | Rising) -> dict[str, np.ndarray]:
+def _arrays(model: BlockModel, history: History, report: Report) -> dict[str, np.ndarray]:
     arrays = history.arrays()
     # The ledger starts at the first state: what is stored then counts as given.
     arrays["energy_error"] = arrays["energy_error"] - arrays["energy_error"][0]
     arrays["outline"] = model.bodies.outline
-    return arrays | test.arrays(history)
+    return arrays | report.arrays(history)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from graben.errors import NumericsFailed
+from graben.mechanics.blocks.loading.biaxial import Biaxial
 from graben.schemas.artifact import check_artifact, read_artifact
 from graben.stages.blocks import stage as blocks
 from graben.stages.particles import stage as particles
@@ -88,7 +89,7 @@ def test_blocks_whose_numbers_are_not_finite_at_the_end(square, monkeypatch):
 @pytest.mark.parametrize(
     ("stage", "place", "scene", "words"),
     [
-        (blocks.Biaxial, "begin", "square", "no state had been saved yet"),
+        (Biaxial, "begin", "square", "no state had been saved yet"),
         (particles, "make_bed", "bed", "no grain had moved yet"),
     ],
 )

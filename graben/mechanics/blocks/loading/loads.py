@@ -1,11 +1,16 @@
-"""Dead loads on an outline that follow courses over the time of loading."""
+"""Dead loads on an outline: pressures on its segments, which follow courses over the time of loading.
+
+They keep the direction and the length of the outline's first shape.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
+from graben.errors import Refused
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.courses import Course
+from graben.mechanics.blocks.shape.bodies import Bodies
 
 
 class Loads:
@@ -44,3 +49,51 @@ class Loads:
     def next_point(self, time: float) -> float:
         """Time of the next point of any course; infinite after the last."""
         return min((course.next_point(time) for _, course in self.patterns), default=float("inf"))
+
+
+def on_segment(bodies: Bodies, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Vertices (flags) on the outline that lie on a segment (start, end: (2,) m)."""
+    d = np.asarray(end, float) - np.asarray(start, float)
+    r = bodies.position - start
+    size = float(np.ptp(bodies.outline, axis=0).max())
+    along = np.clip((r @ d) / float(d @ d), 0.0, 1.0)
+    near = np.linalg.norm(r - along[:, None] * d, axis=1) < 1e-6 * size
+    return near & bodies.vertex_side.any(axis=1)
+
+
+def pressure_forces(bodies: Bodies, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Vertex forces (vertices, 2) [N/m] of a pressure of 1 Pa on the part of the outline along a segment.
+
+    Edges that the segment covers in part take their part, with its moment. Refused when it covers none.
+    """
+    start, end = np.asarray(start, float), np.asarray(end, float)
+    d = end - start
+    length = float(np.linalg.norm(d))
+    tangent = d / length
+    size = float(np.ptp(bodies.outline, axis=0).max())
+    on = bodies.edge_side >= 0
+    a, b = bodies.edge_from[on], bodies.edge_to[on]
+    p, q = bodies.position[a] - start, bodies.position[b] - start
+    off = np.maximum(*(np.abs(r[:, 0] * tangent[1] - r[:, 1] * tangent[0]) for r in (p, q)))
+    sp, sq = p @ tangent, q @ tangent
+    beside = (off < 1e-6 * size) & (np.minimum(sp, sq) < length) & (np.maximum(sp, sq) > 0.0)
+    a, b, sp, sq = a[beside], b[beside], sp[beside], sq[beside]
+    if len(a) == 0:
+        raise Refused("a segment on the outline; no part of the outline lies on it")
+    # Covered part of each edge, as fractions of it from its first vertex.
+    f0, f1 = np.clip((0.0 - sp) / (sq - sp), 0.0, 1.0), np.clip((length - sp) / (sq - sp), 0.0, 1.0)
+    f0, f1 = np.minimum(f0, f1), np.maximum(f0, f1)
+    to_b = 0.5 * (f1**2 - f0**2)
+    to_a = (f1 - f0) - to_b
+    edge = bodies.position[b] - bodies.position[a]
+    inward = np.column_stack([-edge[:, 1], edge[:, 0]])
+    force = np.zeros_like(bodies.position)
+    np.add.at(force, a, to_a[:, None] * inward)
+    np.add.at(force, b, to_b[:, None] * inward)
+    return force
+
+
+def settlement_of(direction: np.ndarray, moved: np.ndarray) -> float:
+    """Displacement along the loads [m]; where no load changes, the mean distance that vertices went."""
+    whole = float(np.hypot(*direction.T).sum())
+    return float((direction * moved).sum() / whole) if whole > 0.0 else float(np.hypot(*moved.T).mean())

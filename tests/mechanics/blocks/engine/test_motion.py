@@ -6,7 +6,7 @@ import pytest
 from graben.errors import NumericsFailed
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
-from graben.mechanics.blocks.loading.compression import compress, consolidate, rectangle_sides
+from graben.mechanics.blocks.loading.biaxial import compress, consolidate, rectangle_sides
 from graben.mechanics.blocks.record.history import History, mean_stress
 from graben.mechanics.blocks.shape import partition
 from graben.mechanics.blocks.shape.bodies import build_bodies
@@ -131,7 +131,8 @@ def small_run():
     ratio = consolidate(model, -0.5e6, -0.25e6)
     at_start = model.zone_stress(), model.boundary_force()
     history = History(model)
-    compress(model, -0.0006, 10000, 11, lambda k, m: history.save())
+    for _ in compress(model, -0.0006, 10000, 11):
+        history.save()
     return model, ratio, at_start, history.arrays()
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
-from graben.mechanics.blocks.loading.compression import Courses, compress, consolidate
+from graben.mechanics.blocks.loading.biaxial import Courses, compress, consolidate
 from graben.mechanics.blocks.loading.courses import Course
 from graben.mechanics.blocks.record.history import History, mean_stress
 from graben.mechanics.blocks.shape.bodies import build_bodies
@@ -32,7 +32,8 @@ def loaded(bodies, joint, courses, steps=6000, states=31, **more):
     model = BlockModel(bodies, young=E, poisson=NU, density=2500.0, joint=joint, rounding=1e-3, dt=DT, **more)
     consolidate(model, -1e5, -1e5, tolerance=1e-4)
     history = History(model)
-    compress(model, 0.0, steps, states, lambda k, m: history.save(), courses=courses)
+    for _ in compress(model, 0.0, steps, states, courses=courses):
+        history.save()
     return model, history.arrays()
 
 

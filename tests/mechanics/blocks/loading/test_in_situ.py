@@ -5,10 +5,10 @@ import pytest
 
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
-from graben.mechanics.blocks.loading import programme
-from graben.mechanics.blocks.loading.compression import rectangle_sides
+from graben.mechanics.blocks.loading.biaxial import rectangle_sides
 from graben.mechanics.blocks.loading.excavation import blocks_in
 from graben.mechanics.blocks.loading.in_situ import InSitu, put_in
+from graben.mechanics.blocks.loading.rest import imbalance
 from graben.mechanics.blocks.record import snapshot
 from graben.mechanics.blocks.shape.bodies import build_bodies
 from graben.mechanics.blocks.shape.joint_sets import JointSet, cut_by_sets
@@ -161,4 +161,4 @@ def test_a_model_with_a_hole_is_brought_back_bitwise():
     for name, value in snapshot.take(model).items():
         assert np.array_equal(value, snapshot.take(again)[name]), name
     assert model.energies() == again.energies()
-    assert programme.imbalance(model) < 1.0
+    assert imbalance(model) < 1.0

@@ -5,7 +5,8 @@ import pytest
 
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel
-from graben.mechanics.blocks.loading import programme
+from graben.mechanics.blocks.loading.loads import on_segment, pressure_forces
+from graben.mechanics.blocks.loading.rest import imbalance, settle
 from graben.mechanics.blocks.record import snapshot
 from graben.mechanics.blocks.shape.bodies import build_bodies
 from graben.mechanics.blocks.shape.tessellation import voronoi_blocks, without
@@ -20,7 +21,7 @@ def slope_model(dt=5e-3):
         bodies, young=65e9, poisson=0.2, density=2700.0, joint=GRANITE, rounding=0.07, dt=dt, gravity=(0.0, -9.81)
     )
     for start, end, axis in (((0, 0), (0, 2), 0), ((8, 0), (8, 5), 0), ((0, 0), (8, 0), 1)):
-        model.hold(programme.on_segment(bodies, np.array(start, float), np.array(end, float)), axis)
+        model.hold(on_segment(bodies, np.array(start, float), np.array(end, float)), axis)
     return model
 
 
@@ -29,7 +30,7 @@ def slope_model(dt=5e-3):
 )
 def test_a_pressure_gives_its_force_and_moment_wherever_it_ends(start, end):
     bodies = build_bodies(voronoi_blocks(SLOPE, 0.7, seed=4))
-    force = programme.pressure_forces(bodies, start, end)
+    force = pressure_forces(bodies, start, end)
     a, b = np.array(start), np.array(end)
     # Counter-clockwise this outline runs to the left or down here; a pressure pushes to the left of that.
     d = min(b - a, a - b, key=lambda v: v[0])
@@ -44,13 +45,14 @@ def test_a_pressure_gives_its_force_and_moment_wherever_it_ends(start, end):
 def test_segments_off_the_outline_are_refused():
     bodies = build_bodies(voronoi_blocks(SLOPE, 0.7, seed=4))
     with pytest.raises(ValueError, match="no part"):
-        programme.pressure_forces(bodies, (5.0, 4.0), (6.0, 4.0))
-    assert not programme.on_segment(bodies, np.array([5.0, 4.0]), np.array([6.0, 4.0])).any()
+        pressure_forces(bodies, (5.0, 4.0), (6.0, 4.0))
+    assert not on_segment(bodies, np.array([5.0, 4.0]), np.array([6.0, 4.0])).any()
 
 
 def test_at_rest_the_base_carries_the_weight():
     model = slope_model()
-    programme.come_to_rest(model, 1e-4)
+    *_, ratio = settle(model, 1e-4, imbalance, limit=100_000, where="rest", advice="support it")
+    assert ratio == imbalance(model) < 1e-4
     weight = 9.81 * 2700.0 * model.bodies.block_area.sum()
     assert model.boundary_force()[:, 1].sum() == pytest.approx(weight, rel=1e-3)
     # Rollers at the sides: what they push from one side, they push from the other.

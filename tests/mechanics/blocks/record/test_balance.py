@@ -5,7 +5,7 @@ import pytest
 
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel
-from graben.mechanics.blocks.loading.compression import compress, consolidate
+from graben.mechanics.blocks.loading.biaxial import compress, consolidate
 from graben.mechanics.blocks.record.balance import balance, zone_pull
 from graben.mechanics.blocks.shape.bodies import build_bodies
 from graben.mechanics.blocks.shape.tessellation import voronoi_blocks
@@ -42,7 +42,8 @@ def moving():
         dt=1e-2,
     )
     consolidate(model, -0.5e6, -0.25e6)
-    compress(model, -0.0006, 2000, 2, lambda k, m: None)
+    for _ in compress(model, -0.0006, 2000, 2):
+        pass
     m = model.motion
     x, v, alpha = m.x.copy(), m.v.copy(), model.damping_coefficient
     model.advance(1)

@@ -5,7 +5,7 @@ import pytest
 
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
-from graben.mechanics.blocks.loading.compression import compress, consolidate
+from graben.mechanics.blocks.loading.biaxial import compress, consolidate
 from graben.mechanics.blocks.record import snapshot
 from graben.mechanics.blocks.record.history import History
 from graben.mechanics.blocks.shape.bodies import build_bodies
@@ -155,13 +155,10 @@ def test_weak_blocks_yield_the_ledger_closes_and_a_snapshot_goes_on():
     consolidate(model, -0.5e6, -0.25e6)
     history = History(model)
     stored = {}
-
-    def save(k, _):
+    for k in compress(model, -0.0006, 10000, 11):
         history.save()
         if k == 6:
             stored.update(snapshot.take(model))
-
-    compress(model, -0.0006, 10000, 11, save)
     a = history.arrays()
     assert (a["zone_state"][-1] != pz.ELASTIC).mean() > 0.1
     assert set(np.unique(a["zone_state"])) <= {0, 1, 2, 3}

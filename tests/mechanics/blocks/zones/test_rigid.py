@@ -5,7 +5,7 @@ import pytest
 
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
-from graben.mechanics.blocks.loading.compression import compress, consolidate
+from graben.mechanics.blocks.loading.biaxial import compress, consolidate
 from graben.mechanics.blocks.record import snapshot
 from graben.mechanics.blocks.record.history import History, mean_stress
 from graben.mechanics.blocks.shape.bodies import build_bodies
@@ -173,13 +173,10 @@ def test_compression_closes_its_ledger_balances_and_goes_on_from_a_snapshot():
     model, halfway = squeezed(), {}
     consolidate(model, -0.5e6, -0.25e6)
     history = History(model)
-
-    def save(k, _):
+    for k in compress(model, -0.0006, 5000, 6):
         history.save()
         if k == 3:
             halfway.update(snapshot.take(model))
-
-    compress(model, -0.0006, 5000, 6, save)
     a = history.arrays()
     assert a["zone_stress"].shape == (6, 0, 4)
     work = np.abs(a["energy_boundary"]) + np.abs(a["energy_external"]) + a["energy_joint"]
@@ -251,6 +248,7 @@ def test_rigid_is_the_limit_of_stiff_elastic_blocks():
         )
         consolidate(model, -0.5e6, -0.25e6)
         history = History(model)
-        compress(model, -0.0006, 3000 if rigid else 15000, 4, lambda k, m, history=history: history.save())
+        for _ in compress(model, -0.0006, 3000 if rigid else 15000, 4):
+            history.save()
         peaks.append(history.arrays()["wall_reaction"][1:, 2, 1])
     assert peaks[0] == pytest.approx(peaks[1], rel=0.05)

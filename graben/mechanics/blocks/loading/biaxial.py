@@ -1,19 +1,18 @@
-"""Biaxial compression of a block assembly: consolidate under confinement, then move the top wall down."""
+"""Biaxial compression of a rectangle of blocks: consolidate under confinement, then move the top wall down."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
-from graben.errors import NumericsFailed, Refused
-from graben.mechanics.blocks.engine.model import BlockModel, Damping
+from graben.errors import Refused
+from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.courses import Course
 from graben.mechanics.blocks.loading.pace import ForceCheck, Pace
-
-# Rest comes soonest with more damping than a moving wall should feel.
-_CONSOLIDATION_DAMPING = 1.0
+from graben.mechanics.blocks.loading.protocol import Moment, State, refuse_unlike
+from graben.mechanics.blocks.loading.rest import settle
 
 # Steps between two looks for loose blocks.
 _LOOSE_EVERY = 250
@@ -58,21 +57,11 @@ def consolidate(
         model.press(b.edge_side == side, lateral)
         model.press(b.edge_side == side, -1.0, rising=True)
     model.press(b.edge_side == sides.top, vertical)
-    ratio = np.inf
-    damping = model.damping
-    model.damp(Damping(ratio=_CONSOLIDATION_DAMPING))
-    for _ in range(0, limit, chunk):
-        model.advance(chunk)
-        ratio = model.unbalanced_ratio()
-        if ratio < tolerance:
-            model.damp(damping)
-            return ratio
-    raise NumericsFailed(
-        f"unbalanced force ratio {ratio:.3g} (limit {tolerance:.3g})",
-        where="consolidation",
-        step=model.steps_done,
-        advice="strengthen the joints or lower the confining stress",
+    advice = "strengthen the joints or lower the confining stress"
+    ratios = settle(
+        model, tolerance, BlockModel.unbalanced_ratio, limit=limit, where="consolidation", advice=advice, chunk=chunk
     )
+    return [*ratios][-1]
 
 
 @dataclass(frozen=True)
@@ -110,15 +99,15 @@ def compress(
     speed: float,
     steps: int,
     states: int,
-    save: Callable[[int, BlockModel], None],
     *,
     ramp_share: float = 0.01,
     saved: int = 0,
     courses: Courses | None = None,
     stop_loose: bool = False,
     paced: tuple[Pace, ForceCheck] | None = None,
-) -> None:
-    """Move the top at `speed` [m/s, negative: down] for `steps` steps; call save(k, model) at `states` states.
+) -> Iterator[int]:
+    """Move the top at `speed` [m/s, negative: down] for `steps` steps; gives the number of each of `states` states
+    when the model is there.
 
     State 0 is the start. The speed rises over the first `ramp_share` of the steps. The pressure on the top is
     dropped: the wall now carries it. saved : states that a model brought back from a snapshot has behind it;
@@ -131,7 +120,7 @@ def compress(
         speed = courses.fastest * (1.0 if paced is None else paced[1].fastest)
     if saved == 0:
         model.begin_ledger()
-        save(0, model)
+        yield 0
         saved = 1
     if saved == 1:
         model.take_off_steady(top, 1)
@@ -153,4 +142,70 @@ def compress(
             if paced is not None:
                 model.time += (rate - 1.0) * taken * model.dt
                 paced[0].look(model, paced[1], b.vertex_side[:, sides.bottom], top)
-        save(k, model)
+        yield k
+
+
+class Biaxial:
+    """The test: a `Loading` whose arguments are those of `consolidate` and `compress`.
+
+    pressure : on left and right, and vertical on the top until the wall takes over [Pa, tension positive]
+    check : of forces; the loading then follows it, at a pace of its own
+    """
+
+    def __init__(
+        self,
+        model: BlockModel,
+        *,
+        pressure: float,
+        vertical: float,
+        speed: float,
+        steps: int,
+        states: int,
+        tolerance: float = 1e-3,
+        courses: Courses | None = None,
+        stop_loose: bool = False,
+        check: ForceCheck | None = None,
+    ) -> None:
+        rectangle_sides(model.bodies.outline)  # refuses any other outline before work begins
+        self.model = model
+        self.rest: np.ndarray = np.zeros(2)
+        self.pace = None if check is None else Pace()
+        self._saved = 0
+        self._pressures, self._tolerance = (pressure, vertical), tolerance
+        self._speed, self._steps, self._states = speed, steps, states
+        self._courses, self._stop_loose, self._check = courses, stop_loose, check
+
+    def begin(self) -> Iterator[Moment]:
+        """Consolidate."""
+        yield Moment(0.0, "consolidation")
+        ratio = consolidate(self.model, *self._pressures, tolerance=self._tolerance)
+        self.rest = np.array([ratio, self.model.steps_done])
+
+    def run(self) -> Iterator[Moment]:
+        """Compress; every moment is a saved state."""
+        last = self._states - 1
+        moments = compress(
+            self.model,
+            self._speed,
+            self._steps,
+            self._states,
+            saved=self._saved,
+            courses=self._courses,
+            stop_loose=self._stop_loose,
+            paced=None if self.pace is None or self._check is None else (self.pace, self._check),
+        )
+        for k in moments:
+            self._saved = k + 1
+            yield Moment(k / last, f"state {k} of {last}", save=True)
+
+    def state(self) -> State:
+        pace = {} if self.pace is None else {f"pace_{k}": np.array(v) for k, v in asdict(self.pace).items()}
+        return {"rest": self.rest, "saved": np.array(self._saved), **pace}
+
+    def bring_back(self, state: State) -> None:
+        refuse_unlike(state, self.state())
+        if not 1 <= state["saved"] <= self._states:
+            raise Refused(f"test.saved: 1 to {self._states}")
+        self.rest, self._saved = state["rest"], int(state["saved"])
+        if self.pace is not None:
+            self.pace = Pace(**{f.name: state[f"pace_{f.name}"].item() for f in fields(Pace)})
