@@ -7,7 +7,6 @@ from graben.mechanics.particles.assembly import Assembly
 from graben.mechanics.particles.bed import Bed, BedRecipe, make_bed
 from graben.mechanics.particles.insertion import insert
 from graben.mechanics.particles.law import LinearLaw
-from graben.mechanics.particles.motion import FLOOR
 from graben.mechanics.wear.counts import contacts_per_area
 
 D = 1e-4
@@ -77,12 +76,13 @@ def test_a_tall_silo_follows_janssen():
     x = insert(np.full(count, D / 2), (width, width), column, np.random.Generator(np.random.PCG64(0)), periodic=False)
     box = Assembly(law, x, np.zeros(count, int), (width, width), periodic=False, safety=0.6)
     weight = count * law.mass[0] * 9.81
+    floor = box.drive.floor
 
     def shares() -> tuple[float, float, float]:
         """Floor's share of the weight, Janssen's, and the mobilised part of the walls' friction."""
-        state, side = box.survey()[0], box.wall_force[:4].sum()
-        height = 2.0 * float((box.x[:, 2] - box.place[FLOOR]).mean())
-        forces, place = box.contact_forces(), box.by_identity(box.x)
+        state, side = box.survey()[0], box.walls.push[:4].sum()
+        height = 2.0 * float((box.bodies.position[:, 2] - box.walls.point[floor, 2]).mean())
+        forces, place = box.contact_forces(), box.by_identity(box.bodies.position)
         first, second = forces.pair.T
         branch = np.where(second[:, None] >= 0, place[second] - place[first], forces.arm)
         vertical = -float((forces.force[:, 2] * branch[:, 2]).sum()) / (width**2 * height)
@@ -92,7 +92,7 @@ def test_a_tall_silo_follows_janssen():
     box.advance(40_000)
     found, janssen, mobilised = shares()
     assert found == pytest.approx(janssen, rel=0.03) and mobilised < 0.2
-    box.speed[FLOOR] = -1e-3
+    box.walls.velocity[floor, 2] = -1e-3
     box.advance(25_000)
     rows = []
     for _ in range(3):

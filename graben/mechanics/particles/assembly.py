@@ -1,4 +1,4 @@
-"""An assembly of spheres in a box with floor, sides and piston: state, neighbour list and time stepping."""
+"""An assembly of spheres between walls: its records, neighbour list and time stepping."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graben.errors import NumericsFailed, Refused
-from graben.mechanics.particles import motion
+from graben.mechanics.particles import motion, records
 from graben.mechanics.particles.contacts import close_ledger
 from graben.mechanics.particles.law import LinearLaw, critical_step
 from graben.mechanics.particles.measures import list_contacts, survey
 from graben.mechanics.particles.neighbours import carry_history, cell_order, grid_shape, half_list, wrap
+from graben.mechanics.particles.records import Bodies, Contacts, Drive, Loads, Walls
+from graben.mechanics.particles.walls import box_walls, joined, level_of, planes, with_slip
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -52,15 +54,17 @@ class ContactForces:
 
 
 class Assembly:
-    """Spheres in [0, width_x) x [0, width_y), floor at z = 0, open top or piston.
+    """Spheres in [0, width_x) x [0, width_y), floor at z = 0, open top or piston; or between walls of any table.
 
     Parameters
     ----------
     position : (n, 3) m; kind : (n,) class index into the tables of `law`
     width : (2,) m; periodic : sides repeat (True) or are hard walls
-    gravity : m/s2, acts along -z; safety : time step over the estimated critical one
+    gravity : m/s2, acts along -z, or a vector (3,)
+    safety : time step over the estimated critical one
     skin : extra reach of the neighbour list over the smallest radius. It adapts while running, within [0.02, 0.4],
         so that lists live some fifty steps while grains fly and stay tight once they rest.
+    walls : a table made by `walls.planes`, sides first and the floor last, in place of those of the box
 
     Raises
     ------
@@ -75,9 +79,10 @@ class Assembly:
         width: tuple[float, float],
         *,
         periodic: bool = True,
-        gravity: float = 9.81,
+        gravity: float | Floats = 9.81,
         safety: float = 0.4,
         skin: float = 0.2,
+        walls: Walls | None = None,
     ) -> None:
         position = np.array(position, dtype=np.float64, order="C")
         kind = np.array(kind, dtype=np.int64)
@@ -90,126 +95,127 @@ class Assembly:
             raise ValueError("position: expected finite values")
         if not (0.0 < safety <= 1.0):
             raise ValueError(f"safety: expected a value in (0, 1], found {safety}")
-        self.law, self.periodic, self.safety = law, bool(periodic), float(safety)
+        self.law, self.safety = law, float(safety)
         self.width = np.array(width, dtype=np.float64)
-        self.kind, self.radius = kind, np.ascontiguousarray(law.radius[kind])
-        self._skin = float(skin) * float(law.radius.min())
-        reach = 2.0 * float(self.radius.max()) + 0.4 * float(law.radius.min())
-        if self.periodic and self.width.min() < 3.0 * reach:
+        self.period = self.width if periodic else None
+        radius = law.radius[kind]
+        reach = 2.0 * float(radius.max()) + 0.4 * float(law.radius.min())
+        if periodic and self.width.min() < 3.0 * reach:
             raise Refused(
                 f"width: a periodic box needs at least {3.0 * reach:.6g} m (three of its largest grains), "
                 f"found {self.width.min():.6g} m"
             )
-        self.x, self.v, self.spin = position, np.zeros((n, 3)), np.zeros((n, 3))
-        self.identity = np.arange(n)
+        still = np.zeros((n, 3))
+        self.bodies = Bodies(position, still, still.copy(), radius, law.mass[kind], kind, np.arange(n))
+        self.walls = box_walls(self.width, periodic) if walls is None else walls
+        if not 0 <= self.walls.kind.min() <= self.walls.kind.max() < law.walls.kn.shape[1]:
+            raise ValueError(f"walls: expected law classes below {law.walls.kn.shape[1]}, found {self.walls.kind}")
+        if law.rubs:
+            self.walls = with_slip(self.walls, n)
+        self.loads = Loads(np.zeros((n, 3)), np.zeros((n, 3)) if law.rubs else None)
+        none = np.zeros((0, 3)) if law.rubs else None
+        skin = float(skin) * float(law.radius.min())
+        self.contacts = Contacts(
+            np.zeros(n + 1, np.int64), np.zeros(0, np.uint32), np.zeros(0), none, position.copy(), skin
+        )
+        down = np.array([0.0, 0.0, -gravity]) if np.ndim(gravity) == 0 else np.array(gravity, dtype=np.float64)
+        floor = len(self.walls.point) - 1
+        self.drive = Drive(down, floor, shake_home=level_of(self.walls, floor))
+        self.clock, self.ledger = np.zeros(records.HANDS), np.zeros(records.ENTRIES)
         self.dt = self.safety * critical_step(law)
-        self.drive = np.zeros(motion.DRIVES)
-        self.drive[motion.GRAVITY] = gravity
-        self.scalars = np.zeros(motion.SCALARS)
-        self.ledger = np.zeros(motion.ENTRIES)
-        self.place = np.array([0.0, self.width[0], 0.0, self.width[1], 0.0, 0.0])
-        self.speed = np.zeros(motion.WALLS)
-        self.wall_force = np.zeros(motion.WALLS)
-        self.force, self.torque = np.zeros((n, 3)), np.zeros((n, 3) if law.rubs else (0, 3))
-        self.wall_slip = np.zeros((n if law.rubs else 0, motion.WALLS, 3))
-        self.first = np.zeros(n + 1, np.int64)
-        self.partner = np.zeros(0, np.uint32)
-        self.dash, self.slip = np.zeros(0), np.zeros((0, 3))
-        self.start = self.x.copy()
         self.steps = 0
         self.rebuilds = 0
-        self.pairs = 0
         self._steps_at_rebuild = 0
         self._capacity = 12 * n
         self._rebuild()
 
     # ---- neighbour list ----
 
+    @property
+    def pairs(self) -> int:
+        """Pairs in the neighbour list."""
+        return int(self.contacts.first[-1])
+
     def _rebuild(self) -> None:
         self._close_ledger()
-        if not np.all(np.isfinite(self.x)):
+        x, old = self.bodies.position, self.contacts
+        if not np.all(np.isfinite(x)):
             raise NumericsFailed("positions are not finite", step=self.steps, advice="lower the time step safety")
-        if self.periodic:
-            wrap(self.x, self.width)
-        lasted = self.steps - self._steps_at_rebuild
-        smallest = float(self.law.radius.min())
-        if self.rebuilds > 0:
-            if lasted < 25:
-                self._skin = min(1.5 * self._skin, 0.4 * smallest)
-            elif lasted > 100:
-                self._skin = max(0.7 * self._skin, 0.02 * smallest)
-        cutoff = 2.0 * float(self.radius.max()) + self._skin
-        low, high = self.x.min(axis=0), self.x.max(axis=0)
-        if self.periodic:
-            low[:2], high[:2] = 0.0, self.width
+        if self.period is not None:
+            wrap(x, self.period)
+        skin = self._next_skin()
+        cutoff = 2.0 * float(self.bodies.radius.max()) + skin
+        low, high = x.min(axis=0), x.max(axis=0)
+        if self.period is not None:
+            low[:2], high[:2] = 0.0, self.period
         reach = high - low
-        if reach[2] > 1e4 * cutoff * self.x.shape[0] ** (1 / 3):
+        if reach[2] > 1e4 * cutoff * x.shape[0] ** (1 / 3):
             raise NumericsFailed(
                 f"a particle flew {reach[2]:.3g} m away", step=self.steps, advice="lower the time step safety"
             )
         counts = grid_shape(reach, cutoff)
-        size = np.where(reach > 0.0, reach, cutoff) / counts
-        order, start = cell_order(self.x, low, size, counts)
-        old_first, old_partner, old_slip, old_identity = self.first, self.partner, self.slip, self.identity
-        for name in ("x", "v", "radius", "kind", "identity", "force"):
-            setattr(self, name, np.ascontiguousarray(getattr(self, name)[order]))
-        if self.law.rubs:
-            for name in ("spin", "wall_slip", "torque"):
-                setattr(self, name, np.ascontiguousarray(getattr(self, name)[order]))
-        n = self.x.shape[0]
+        order, start = cell_order(x, low, np.where(reach > 0.0, reach, cutoff) / counts, counts)
+        old_identity = self.bodies.identity
+        bodies = self.bodies = self.bodies.sorted(order)
+        torque = self.loads.torque
+        self.loads = Loads(self.loads.force[order], None if torque is None else torque[order])
+        if self.walls.slip is not None:
+            self.walls = self.walls._replace(slip=self.walls.slip[order])
+        n = x.shape[0]
         first = np.empty(n + 1, np.int64)
         while True:
             partner = np.empty(self._capacity, np.uint32)
-            found = half_list(
-                self.x, self.radius, self.width, self.periodic, start, counts, self._skin, first, partner
-            )
+            found = half_list(bodies, self.period, start, counts, skin, first, partner)
             if found <= self._capacity:
                 break
             self._capacity = found + found // 4
-        self.first, self.partner, self.pairs = first, partner, int(found)
-        self.dash = np.zeros(self._capacity)
-        if self.law.rubs:
-            self.slip = np.zeros((self._capacity, 3))
+        slip = None
+        if old.slip is not None:
+            slip = np.zeros((self._capacity, 3))
             place = np.empty(n, np.int64)
             place[old_identity] = np.arange(n)
-            carry_history(old_first, old_partner, old_slip, place, self.identity, first, partner, self.slip)
-        self.start = self.x.copy()
+            carry_history(old, place, bodies.identity, first, partner, slip)
+        self.contacts = Contacts(first, partner, np.zeros(self._capacity), slip, bodies.position.copy(), skin)
         self._steps_at_rebuild = self.steps
         self.rebuilds += 1
 
+    def _next_skin(self) -> float:
+        """m, from how long the last list lasted."""
+        skin, smallest = self.contacts.skin, float(self.law.radius.min())
+        lasted = self.steps - self._steps_at_rebuild
+        if self.rebuilds > 0:
+            if lasted < 25:
+                return min(1.5 * skin, 0.4 * smallest)
+            if lasted > 100:
+                return max(0.7 * skin, 0.02 * smallest)
+        return skin
+
     def _close_ledger(self) -> None:
         if self.pairs:
-            self.ledger[motion.DASHPOTS] += close_ledger(
-                self.x, self.v, self.first, self.partner, self.dash, self.width, self.periodic, 0.5 * self.dt
-            )
+            self.ledger[records.DASHPOTS] += close_ledger(self.bodies, self.contacts, self.period, 0.5 * self.dt)
 
     # ---- running ----
 
     def advance(self, steps: int) -> None:
         """Run `steps` time steps."""
-        law = self.law
         left = int(steps)
         while left > 0:
             done = motion.advance(
-                left, self.dt, self.x, self.v, self.spin, self.radius, self.kind, self.first, self.partner, self.dash,
-                self.slip, self.wall_slip, self.start, self.force, self.torque,
-                law.mass, law.pair_kn, law.pair_cn, law.pair_kt, law.pair_ct, law.friction,
-                law.wall_kn, law.wall_cn, law.wall_kt, law.wall_ct, law.wall_friction,
-                law.rubs, self.periodic, self.width, self.drive, self.place, self.speed, self.scalars, self._skin,
-                self.wall_force, self.ledger,
+                left, self.dt, self.bodies, self.contacts, self.walls, self.loads, self.law.tables, self.drive,
+                self.clock, self.ledger, self.period,
             )  # fmt: skip
             left -= done
             self.steps += done
             self._rebuild_if_moved()
 
     def _rebuild_if_moved(self) -> None:
-        moved = float(np.max(np.einsum("ij,ij->i", self.x - self.start, self.x - self.start)))
-        if not moved <= 0.25 * self._skin**2:
+        moved = self.bodies.position - self.contacts.start
+        if not float(np.max(np.einsum("ij,ij->i", moved, moved))) <= 0.25 * self.contacts.skin**2:
             self._rebuild()
 
     @property
     def time(self) -> float:
-        return float(self.scalars[motion.TIME])
+        return float(self.clock[records.TIME])
 
     def change_law(self, law: LinearLaw) -> None:
         """Go on with another law of the same classes (other damping, say); the time step follows."""
@@ -229,45 +235,66 @@ class Assembly:
     # ---- drives ----
 
     def shake_floor(self, amplitude: float, frequency: float) -> None:
-        """Move the floor as amplitude sin(2 pi frequency t) from now on; amplitude 0 stops it at z = 0."""
-        self.drive[motion.SHAKE_AMPLITUDE] = amplitude
-        self.drive[motion.SHAKE_OMEGA] = 2.0 * np.pi * frequency
-        self.drive[motion.SHAKE_START] = self.time
+        """Move the floor along its normal as amplitude sin(2 pi frequency t); amplitude 0 stops it where it began."""
+        self.drive = self.drive._replace(
+            shake_amplitude=float(amplitude), shake_omega=2.0 * np.pi * frequency, shake_start=self.time
+        )
         if amplitude == 0.0:
-            self.place[motion.FLOOR] = self.speed[motion.FLOOR] = 0.0
+            floor, walls = self.drive.floor, self.walls
+            walls.point[floor] += (self.drive.shake_home - level_of(walls, floor)) * walls.normal[floor]
+            walls.velocity[floor] = 0.0
+
+    def brake(self, rate: float) -> None:
+        """Slow all bodies by a force of rate (1/s) times mass and velocity."""
+        self.drive = self.drive._replace(drag=float(rate))
 
     def set_piston(self, height: float, mass: float, damping: float, force: float, rate: float) -> None:
-        """Put a plate at `height` that is pushed down by a force growing at `rate` (N/s) up to `force` (N).
+        """Put a plate at `height` above the floor, pushed by a force that grows at `rate` (N/s) up to `force` (N).
 
-        mass kg and damping N s/m are those of the plate: they steer how it finds its place, not where.
+        height m along the floor's normal; mass kg and damping N s/m are those of the plate: they steer how it finds
+        its place, not where.
         """
         if not (mass > 0.0 and damping >= 0.0 and rate > 0.0):
             raise ValueError(f"piston: expected mass > 0, damping >= 0, rate > 0, found {mass}, {damping}, {rate}")
-        d = self.drive
-        d[motion.PISTON_ON], d[motion.PISTON_MASS], d[motion.PISTON_DAMPING] = 1.0, mass, damping
-        d[motion.PISTON_FORCE], d[motion.PISTON_RATE] = force, rate
-        self.scalars[motion.PISTON_PUSH] = 0.0
-        self.place[motion.PISTON], self.speed[motion.PISTON] = height, 0.0
+        up, row = self.walls.normal[self.drive.floor], self.drive.piston
+        if row < 0:
+            row = len(self.walls.point)
+            self.walls = joined(self.walls, planes([height * up], [-up]))
+        self.walls.point[row], self.walls.velocity[row] = height * up, 0.0
+        self.drive = self.drive._replace(
+            piston=row, piston_mass=float(mass), piston_damping=float(damping), piston_force=float(force),
+            piston_rate=float(rate),
+        )  # fmt: skip
+        self.clock[records.PISTON_PUSH] = 0.0
+
+    @property
+    def piston_push(self) -> float:
+        """Force that pushes the piston now, N."""
+        return float(self.clock[records.PISTON_PUSH])
+
+    @property
+    def piston_height(self) -> float:
+        """Place of the piston along the floor's normal, m; 0 without one."""
+        row = self.drive.piston
+        return -level_of(self.walls, row) if row >= 0 else 0.0
 
     # ---- measures ----
 
     def survey(self) -> tuple[Survey, Floats, Ints]:
         """Sums of the present state, the floor force of each particle (n,) N and its contacts (n,)."""
-        n, law = self.x.shape[0], self.law
-        floor_force, coordination, stiffness = np.empty(n), np.empty(n, np.int64), np.empty(n)
+        n, law = len(self.bodies.radius), self.law
+        floor_force, coordination, hardest = np.empty(n), np.empty(n, np.int64), np.empty(n)
         out = survey(
-            self.x, self.v, self.spin, self.radius, self.kind, law.mass, self.first, self.partner, self.slip,
-            self.force, law.pair_kn, law.pair_kt, law.wall_kn, law.wall_kt, self.wall_slip, law.rubs, self.periodic,
-            self.width, self.place, self.drive[motion.GRAVITY], self.drive[motion.PISTON_ON] > 0.0,
-            floor_force, coordination, stiffness,
+            self.bodies, self.contacts, self.contacts.slip, self.walls, self.walls.slip, self.loads.force, law.tables,
+            self.drive, self.period, floor_force, coordination, hardest,
         )  # fmt: skip
-        highest = 2.0 * float(np.max(stiffness / law.mass[self.kind]))
+        highest = 2.0 * float(np.max(hardest / self.bodies.mass))
         if law.rubs:
             highest *= 1.0 + 7.0 * law.shear_ratio
         over = 0.0
         if highest > 0.0:
             omega = np.sqrt(highest)
-            ratio = law.pair_cn / law.pair_kn
+            ratio = law.pairs.cn / law.pairs.kn
             xi = 0.5 * omega * float(ratio.max())
             over = self.dt / (2.0 / omega * (np.sqrt(1.0 + xi * xi) - xi))
         kinetic, spinning, elastic, potential, mean, net, count, overlap, floor, piston, walls = map(float, out)
@@ -276,57 +303,54 @@ class Assembly:
         )  # fmt: skip
         return found, floor_force, coordination
 
-    def contacts(self) -> tuple[Ints, Floats, Floats]:
+    def touching(self) -> tuple[Ints, Floats, Floats]:
         """Touching pairs as identities (m, 2), unit normals first to second (m, 3), spring forces (m,) N."""
         m = self.pairs
         pair, normal, push = np.empty((m, 2), np.int64), np.empty((m, 3)), np.empty(m)
-        m = list_contacts(
-            self.x, self.radius, self.kind, self.first, self.partner, self.law.pair_kn, self.width, self.periodic,
-            pair, normal, push,
-        )  # fmt: skip
-        return self.identity[pair[:m]], normal[:m], push[:m]
+        m = list_contacts(self.bodies, self.contacts, self.law.pairs, self.period, pair, normal, push)
+        return self.bodies.identity[pair[:m]], normal[:m], push[:m]
 
     def contact_forces(self) -> ContactForces:
         """All contacts of the present state with spheres and walls, by identity: springs only, friction included."""
-        law, pairs = self.law, self.pairs
-        i = np.repeat(np.arange(self.x.shape[0]), np.diff(self.first))
-        j = self.partner[:pairs].astype(np.int64)
-        branch = self.x[j] - self.x[i]
-        if self.periodic:
-            branch[:, :2] -= self.width * np.rint(branch[:, :2] / self.width)
+        law, x, radius, kind = self.law, self.bodies.position, self.bodies.radius, self.bodies.kind
+        identity, slip, walls = self.bodies.identity, self.contacts.slip, self.walls
+        i = np.repeat(np.arange(x.shape[0]), np.diff(self.contacts.first))
+        j = self.contacts.partner[: self.pairs].astype(np.int64)
+        branch = x[j] - x[i]
+        if self.period is not None:
+            branch[:, :2] -= self.period * np.rint(branch[:, :2] / self.period)
         distance = np.sqrt(np.einsum("ij,ij->i", branch, branch))
-        overlap = self.radius[i] + self.radius[j] - distance
+        overlap = radius[i] + radius[j] - distance
         touch = overlap > 0.0
-        i, j, overlap, shear = i[touch], j[touch], overlap[touch], self.slip[:pairs][touch] if law.rubs else 0.0
+        i, j, overlap = i[touch], j[touch], overlap[touch]
+        shear = 0.0 if slip is None else slip[: self.pairs][touch]
         normal = branch[touch] / distance[touch, None]
-        pair = [np.stack([self.identity[i], self.identity[j]], axis=1)]
-        force = [shear - (law.pair_kn[self.kind[i], self.kind[j]] * overlap)[:, None] * normal]
-        arm = [(self.radius[i] - 0.5 * overlap)[:, None] * normal]
-        walls = range(4 if self.periodic else 0, 6 if self.drive[motion.PISTON_ON] > 0.0 else 5)
-        for w in walls:
-            axis, side = w // 2, 1.0 if w % 2 == 0 else -1.0
-            overlap = self.radius - side * (self.x[:, axis] - self.place[w])
+        pair = [np.stack([identity[i], identity[j]], axis=1)]
+        force = [shear - (law.pairs.kn[kind[i], kind[j]] * overlap)[:, None] * normal]
+        arm = [(radius[i] - 0.5 * overlap)[:, None] * normal]
+        for w in range(len(walls.point)):
+            overlap = radius - (x - walls.point[w]) @ walls.normal[w]
             i = np.flatnonzero(overlap > 0.0)
-            normal = np.zeros((i.size, 3))
-            normal[:, axis] = -side
-            shear = self.wall_slip[i, w] if law.rubs else 0.0
-            pair.append(np.stack([self.identity[i], np.full(i.size, -1)], axis=1))
-            force.append(shear - (law.wall_kn[self.kind[i]] * overlap[i])[:, None] * normal)
-            arm.append((self.radius[i] - overlap[i])[:, None] * normal)
+            normal = np.broadcast_to(0.0 - walls.normal[w], (i.size, 3))
+            shear = 0.0 if walls.slip is None else walls.slip[i, w]
+            pair.append(np.stack([identity[i], np.full(i.size, -1)], axis=1))
+            force.append(shear - (law.walls.kn[kind[i], walls.kind[w]] * overlap[i])[:, None] * normal)
+            arm.append((radius[i] - overlap[i])[:, None] * normal)
         return ContactForces(*(np.concatenate(part) for part in (pair, force, arm)))
 
     def energy(self) -> dict[str, float]:
         """Every entry of the energy balance, J; `total` stays constant when the steps are exact."""
         self._close_ledger()
         s, _, _ = self.survey()
-        plate = 0.5 * self.drive[motion.PISTON_MASS] * self.speed[motion.PISTON] ** 2
+        ledger, row = self.ledger, self.drive.piston
+        plate = 0.5 * self.drive.piston_mass * float(np.sum(self.walls.velocity[row] ** 2)) if row >= 0 else 0.0
         kinetic = s.kinetic + s.spinning + plate
         lost = {
-            "dashpots": self.ledger[motion.DASHPOTS],
-            "friction": self.ledger[motion.FRICTION],
-            "drag": self.ledger[motion.DRAG] + self.ledger[motion.PISTON_DASHPOT],
+            "dashpots": ledger[records.DASHPOTS],
+            "friction": ledger[records.FRICTION],
+            "drag": ledger[records.DRAG] + ledger[records.PISTON_DASHPOT],
         }
-        work = {"floor_work": self.ledger[motion.FLOOR_WORK], "piston_work": self.ledger[motion.PISTON_WORK]}
+        work = {"floor_work": ledger[records.WALL_WORK], "piston_work": ledger[records.PISTON_WORK]}
         total = kinetic + s.elastic + s.potential + sum(lost.values()) - sum(work.values())
         out = {"kinetic": kinetic, "elastic": s.elastic, "potential": s.potential, **lost, **work, "total": total}
         return {name: float(value) for name, value in out.items()}
@@ -334,5 +358,5 @@ class Assembly:
     def by_identity(self, values: NDArray) -> NDArray:
         """Values (n, ...) in the present cell order, put back into the order in which particles were given."""
         out = np.empty_like(values)
-        out[self.identity] = values
+        out[self.bodies.identity] = values
         return out

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graben.errors import NumericsFailed, Refused
-from graben.mechanics.particles import motion
 from graben.mechanics.particles.assembly import Assembly, ContactForces, Survey
 from graben.mechanics.particles.insertion import insert
 from graben.mechanics.particles.law import LinearLaw
@@ -184,7 +183,13 @@ class _Run:
 
     def snapshot(self) -> Snapshot:
         box, kind = self.box, self.insertion_kind
-        return Snapshot(box.time, box.by_identity(box.x), box.by_identity(box.v), box.law.radius[kind], kind)
+        return Snapshot(
+            box.time,
+            box.by_identity(box.bodies.position),
+            box.by_identity(box.bodies.velocity),
+            box.law.radius[kind],
+            kind,
+        )
 
     def sample(self) -> Survey:
         box = self.box
@@ -207,7 +212,7 @@ class _Run:
                 advice="raise the normal stiffness or lower the pressure",
             )  # fmt: skip
         known = {**energy, "time": box.time, "unbalanced": min(s.unbalanced, 1e30), "floor_push": s.floor_push,
-                 "piston_push": s.piston_push, "piston_height": box.place[motion.PISTON],
+                 "piston_push": s.piston_push, "piston_height": box.piston_height,
                  "floor_contacts": float(np.count_nonzero(floor_force)), "wall_lift": s.wall_lift}  # fmt: skip
         self.rows.append([known[name] for name in HISTORY])
         self.last_good = self.snapshot()
@@ -231,7 +236,7 @@ class _Run:
                     f"{phase} did not come to rest: {lacking}", step=self.box.steps,
                     advice="raise numerics.max_steps, numerics.rest or numerics.balance, or the contact damping",
                 )  # fmt: skip
-        self.states[phase] = self.box.by_identity(self.box.x)
+        self.states[phase] = self.box.by_identity(self.box.bodies.position)
         self.times[phase] = self.box.time
         self.forces[phase] = self.box.contact_forces()
         return s
@@ -243,7 +248,8 @@ class _Run:
         if not s.unbalanced < balance:
             return f"unbalanced force {s.unbalanced:.3g} of the mean contact force (limit {balance:g})"
         if not s.kinetic < slow:
-            speed = np.sqrt(np.einsum("ij,ij->i", self.box.v, self.box.v))
+            v = self.box.bodies.velocity
+            speed = np.sqrt(np.einsum("ij,ij->i", v, v))
             moving = int(np.count_nonzero(speed**2 > 2.0 * slow / self.mass))
             return (
                 f"kinetic energy {s.kinetic:.3g} J (limit {slow:.3g} J), {moving} of {len(speed)} grains move, "
@@ -278,7 +284,7 @@ def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
     """All phases after insertion."""
     box = run.box
     small = float(law.radius.min())
-    mean_k = float(np.mean(np.diag(law.pair_kn)))
+    mean_k = float(np.mean(np.diag(law.pairs.kn)))
     weight = run.mass * recipe.gravity
 
     # without friction between grains a bed creeps on for long; pressing and quenching bring it to rest
@@ -300,7 +306,7 @@ def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
         at_rest = run.until("shaken", resting, (0.6, 0.7))
 
     # the plate is light, so that it follows the bed, and its dashpot is critical on the bed's stiffness
-    top = float(np.max(box.x[:, 2] + box.radius))
+    top = float(np.max(box.bodies.position[:, 2] + box.bodies.radius))
     push = recipe.pressure * run.area
     cell = (2.0 * small) ** 2
     footing = min(run.area, len(run.insertion_kind) * cell)  # few grains are fewer than a layer
@@ -312,7 +318,7 @@ def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
     box.set_piston(top, plate_mass, damping, push, push / (recipe.ramp * pace))
 
     def pressed(s: Survey) -> str:
-        if box.scalars[motion.PISTON_PUSH] < push or not abs(s.piston_push - push) < 0.01 * push:
+        if box.piston_push < push or not abs(s.piston_push - push) < 0.01 * push:
             return f"the piston pushes with {s.piston_push:.4g} N of {push:.4g} N"
         if not s.unbalanced < 10.0 * recipe.balance:
             return f"unbalanced force {s.unbalanced:.3g} of the mean contact force (limit {10.0 * recipe.balance:g})"
@@ -320,17 +326,17 @@ def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
 
     run.until("pressed", pressed, (0.7, 0.9))
     # quench: drag that damps the slowest mode critically, until forces balance
-    box.drive[motion.DRAG_RATE] = 2.0 * np.pi / (2.0 * pace)
+    box.brake(2.0 * np.pi / (2.0 * pace))
     run.until("quenched", lambda s: run.unrest(s, recipe.balance), (0.9, 1.0))
 
     s, floor_force, coordination = box.survey()
-    pair, normal, contact_push = box.contacts()
-    height = float(box.place[motion.PISTON])
+    pair, normal, contact_push = box.touching()
+    height = box.piston_height
     return Bed(
         radius=law.radius[run.insertion_kind],
         kind=run.insertion_kind,
         position=run.states["quenched"],
-        velocity=box.by_identity(box.v),
+        velocity=box.by_identity(box.bodies.velocity),
         floor_force=box.by_identity(floor_force),
         coordination=box.by_identity(coordination),
         pair=pair,

@@ -1,8 +1,7 @@
-"""Forces between spheres: H (4.1)-(4.8) with dashpots H (4.9)-(4.10), one kernel without and one with friction.
+"""Forces between spheres: H (4.1)-(4.8) with dashpots H (4.9)-(4.10), one loop over all pairs.
 
-The dashpot never pulls: normal force = max(0, K U + c dU/dt). The work of the dashpots is accounted with the mean of
-the velocities before and after each kick, which is exact for the leapfrog; hence `dash`, the dashpot force of the
-last step, per pair.
+The work of the normal dashpots is accounted with the mean of the velocities before and after each kick, which is
+exact for the leapfrog; hence `dash`, the dashpot force of the last step, per pair.
 """
 
 from __future__ import annotations
@@ -10,86 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from graben.mechanics.compiled import kernel
-
-
-@kernel(error_model="numpy")
-def smooth_forces(x, v, radius, kind, first, partner, dash, kn, cn, width, periodic, half_dt, force):
-    """Add frictionless contact forces to force (n, 3); return the energy taken by the dashpots, J."""
-    lost = 0.0
-    wx, wy = width[0], width[1]
-    hx, hy = 0.5 * wx, 0.5 * wy
-    for i in range(x.shape[0]):
-        xi, yi, zi = x[i, 0], x[i, 1], x[i, 2]
-        ui, vi, wi = v[i, 0], v[i, 1], v[i, 2]
-        ri, ci = radius[i], kind[i]
-        fx = fy = fz = 0.0
-        for k in range(first[i], first[i + 1]):
-            j = partner[k]
-            gx, gy, gz = x[j, 0] - xi, x[j, 1] - yi, x[j, 2] - zi
-            if periodic:
-                if gx > hx:
-                    gx -= wx
-                elif gx < -hx:
-                    gx += wx
-                if gy > hy:
-                    gy -= wy
-                elif gy < -hy:
-                    gy += wy
-            d2 = gx * gx + gy * gy + gz * gz
-            rr = ri + radius[j]
-            if d2 < rr * rr:
-                d = np.sqrt(d2)
-                inv = 1.0 / d
-                gx *= inv
-                gy *= inv
-                gz *= inv
-                opening = (v[j, 0] - ui) * gx + (v[j, 1] - vi) * gy + (v[j, 2] - wi) * gz
-                spring = kn[ci, kind[j]] * (rr - d)
-                total = spring - cn[ci, kind[j]] * opening
-                if total < 0.0:
-                    total = 0.0
-                damp = total - spring
-                lost -= half_dt * (dash[k] + damp) * opening
-                dash[k] = damp
-                fx -= total * gx
-                fy -= total * gy
-                fz -= total * gz
-                force[j, 0] += total * gx
-                force[j, 1] += total * gy
-                force[j, 2] += total * gz
-            elif dash[k] != 0.0:
-                inv = 1.0 / np.sqrt(d2)
-                opening = ((v[j, 0] - ui) * gx + (v[j, 1] - vi) * gy + (v[j, 2] - wi) * gz) * inv
-                lost -= half_dt * dash[k] * opening
-                dash[k] = 0.0
-        force[i, 0] += fx
-        force[i, 1] += fy
-        force[i, 2] += fz
-    return lost
-
-
-@kernel(error_model="numpy")
-def close_ledger(x, v, first, partner, dash, width, periodic, half_dt):
-    """Account the second half of the last dashpot work and forget it (before a list is rebuilt); returns J."""
-    lost = 0.0
-    for i in range(x.shape[0]):
-        for k in range(first[i], first[i + 1]):
-            if dash[k] != 0.0:
-                j = partner[k]
-                d2 = 0.0
-                opening = 0.0
-                for a in range(3):
-                    g = x[j, a] - x[i, a]
-                    if periodic and a < 2:
-                        if g > 0.5 * width[a]:
-                            g -= width[a]
-                        elif g < -0.5 * width[a]:
-                            g += width[a]
-                    d2 += g * g
-                    opening += g * (v[j, a] - v[i, a])
-                lost -= half_dt * dash[k] * opening / np.sqrt(d2)
-                dash[k] = 0.0
-    return lost
+from graben.mechanics.particles.dispatch import normal, shear, shear_energy
 
 
 @kernel(error_model="numpy")
@@ -142,46 +62,39 @@ def rub(nx, ny, nz, px, py, pz, sx, sy, sz, kt, ct, limit, dt):
 
 
 @kernel(error_model="numpy")
-def rough_forces(
-    x,
-    v,
-    spin,
-    radius,
-    kind,
-    first,
-    partner,
-    dash,
-    slip,
-    kn,
-    cn,
-    kt,
-    ct,
-    friction,
-    width,
-    periodic,
-    half_dt,
-    force,
-    torque,
-):
-    """Add contact forces (n, 3) and torques (n, 3) with friction; slip (pairs, 3) holds the tangential springs.
+def pair_forces(bodies, contacts, slip, loads, law, period, dt):
+    """Set force and torque of `loads` to the sums over pairs, and go on with dash and slip of `contacts`.
 
-    Returns the energies taken by the normal dashpots and by friction with the tangential dashpots, J.
+    slip (pairs, 3) or None without friction; period (2,) m of the sides or None; law: table of a type in
+    `dispatch.LAWS`. Returns the energies taken by the normal dashpots and by friction with the tangential ones, J.
     """
-    lost = 0.0
-    rubbed = 0.0
-    dt = 2.0 * half_dt
-    wx, wy = width[0], width[1]
-    hx, hy = 0.5 * wx, 0.5 * wy
+    x, v, spin, radius, kind = bodies.position, bodies.velocity, bodies.spin, bodies.radius, bodies.kind
+    first, partner, dash, force = contacts.first, contacts.partner, contacts.dash, loads.force
+    for i in range(x.shape[0]):
+        for a in range(3):
+            force[i, a] = 0.0
+    if slip is not None:
+        torque = loads.torque
+        for i in range(x.shape[0]):
+            for a in range(3):
+                torque[i, a] = 0.0
+    if period is not None:
+        wx, wy = period[0], period[1]
+        hx, hy = 0.5 * wx, 0.5 * wy
+    half = 0.5 * dt
+    lost = rubbed = 0.0
     for i in range(x.shape[0]):
         xi, yi, zi = x[i, 0], x[i, 1], x[i, 2]
         ui, vi, wi = v[i, 0], v[i, 1], v[i, 2]
-        pi, qi, si = spin[i, 0], spin[i, 1], spin[i, 2]
         ri, ci = radius[i], kind[i]
-        sumx = sumy = sumz = turnx = turny = turnz = 0.0
+        sumx = sumy = sumz = 0.0
+        if slip is not None:
+            pi, qi, si = spin[i, 0], spin[i, 1], spin[i, 2]
+            turnx = turny = turnz = 0.0
         for k in range(first[i], first[i + 1]):
             j = partner[k]
             gx, gy, gz = x[j, 0] - xi, x[j, 1] - yi, x[j, 2] - zi
-            if periodic:
+            if period is not None:
                 if gx > hx:
                     gx -= wx
                 elif gx < -hx:
@@ -203,56 +116,85 @@ def rough_forces(
                 px, py, pz = v[j, 0] - ui, v[j, 1] - vi, v[j, 2] - wi
                 opening = px * gx + py * gy + pz * gz
                 overlap = rr - d
-                spring = kn[ci, cj] * overlap
-                total = spring - cn[ci, cj] * opening
-                if total < 0.0:
-                    total = 0.0
+                spring, total = normal(law, ci, cj, overlap, opening)
                 damp = total - spring
-                lost -= half_dt * (dash[k] + damp) * opening
+                lost -= half * (dash[k] + damp) * opening
                 dash[k] = damp
-                # lever arms to the contact point H (4.4)
-                ai, aj = ri - 0.5 * overlap, rj - 0.5 * overlap
-                ox = ai * pi + aj * spin[j, 0]
-                oy = ai * qi + aj * spin[j, 1]
-                oz = ai * si + aj * spin[j, 2]
-                px -= oy * gz - oz * gy
-                py -= oz * gx - ox * gz
-                pz -= ox * gy - oy * gx
-                sx, sy, sz, tx, ty, tz, gone = rub(
-                    gx, gy, gz, px, py, pz, slip[k, 0], slip[k, 1], slip[k, 2], kt[ci, cj], ct[ci, cj],
-                    friction * total, dt,
-                )  # fmt: skip
-                rubbed += gone
-                slip[k, 0] = sx
-                slip[k, 1] = sy
-                slip[k, 2] = sz
-                fx, fy, fz = tx - total * gx, ty - total * gy, tz - total * gz
+                fx, fy, fz = -total * gx, -total * gy, -total * gz
+                if slip is not None:
+                    # lever arms to the contact point H (4.4)
+                    ai, aj = ri - 0.5 * overlap, rj - 0.5 * overlap
+                    ox = ai * pi + aj * spin[j, 0]
+                    oy = ai * qi + aj * spin[j, 1]
+                    oz = ai * si + aj * spin[j, 2]
+                    px -= oy * gz - oz * gy
+                    py -= oz * gx - ox * gz
+                    pz -= ox * gy - oy * gx
+                    kt, ct, limit = shear(law, ci, cj, overlap, total)
+                    sx, sy, sz, tx, ty, tz, gone = rub(
+                        gx, gy, gz, px, py, pz, slip[k, 0], slip[k, 1], slip[k, 2], kt, ct, limit, dt
+                    )
+                    rubbed += gone
+                    slip[k, 0] = sx
+                    slip[k, 1] = sy
+                    slip[k, 2] = sz
+                    fx += tx
+                    fy += ty
+                    fz += tz
+                    mx, my, mz = gy * tz - gz * ty, gz * tx - gx * tz, gx * ty - gy * tx
+                    turnx += ai * mx
+                    turny += ai * my
+                    turnz += ai * mz
+                    torque[j, 0] += aj * mx
+                    torque[j, 1] += aj * my
+                    torque[j, 2] += aj * mz
                 sumx += fx
                 sumy += fy
                 sumz += fz
                 force[j, 0] -= fx
                 force[j, 1] -= fy
                 force[j, 2] -= fz
-                mx, my, mz = gy * tz - gz * ty, gz * tx - gx * tz, gx * ty - gy * tx
-                turnx += ai * mx
-                turny += ai * my
-                turnz += ai * mz
-                torque[j, 0] += aj * mx
-                torque[j, 1] += aj * my
-                torque[j, 2] += aj * mz
             else:
                 if dash[k] != 0.0:
                     opening = (v[j, 0] - ui) * gx + (v[j, 1] - vi) * gy + (v[j, 2] - wi) * gz
-                    lost -= half_dt * dash[k] * opening / np.sqrt(d2)
+                    lost -= half * dash[k] * opening / np.sqrt(d2)
                     dash[k] = 0.0
-                s2 = slip[k, 0] ** 2 + slip[k, 1] ** 2 + slip[k, 2] ** 2
-                if s2 > 0.0:  # the spring of a contact that opened
-                    rubbed += 0.5 * s2 / kt[ci, kind[j]]
-                    slip[k, 0] = slip[k, 1] = slip[k, 2] = 0.0
+                if slip is not None:
+                    size2 = slip[k, 0] ** 2 + slip[k, 1] ** 2 + slip[k, 2] ** 2
+                    if size2 > 0.0:  # the spring of a contact that opened
+                        rubbed += shear_energy(law, ci, kind[j], rr - np.sqrt(d2), size2)
+                        slip[k, 0] = slip[k, 1] = slip[k, 2] = 0.0
         force[i, 0] += sumx
         force[i, 1] += sumy
         force[i, 2] += sumz
-        torque[i, 0] += turnx
-        torque[i, 1] += turny
-        torque[i, 2] += turnz
+        if slip is not None:
+            torque[i, 0] += turnx
+            torque[i, 1] += turny
+            torque[i, 2] += turnz
     return lost, rubbed
+
+
+@kernel(error_model="numpy")
+def close_ledger(bodies, contacts, period, half_dt):
+    """Account the second half of the last dashpot work and forget it (before a list is rebuilt); returns J."""
+    x, v, first, partner, dash = bodies.position, bodies.velocity, contacts.first, contacts.partner, contacts.dash
+    lost = 0.0
+    for i in range(x.shape[0]):
+        for k in range(first[i], first[i + 1]):
+            if dash[k] != 0.0:
+                j = partner[k]
+                d2 = 0.0
+                opening = 0.0
+                for a in range(3):
+                    g = x[j, a] - x[i, a]
+                    if period is not None:  # noqa: SIM102  (numba drops a branch on this alone)
+                        if a < 2:
+                            if g > 0.5 * period[a]:
+                                g -= period[a]
+                            elif g < -0.5 * period[a]:
+                                g += period[a]
+                    d2 += g * g
+                    opening += g * (v[j, a] - v[i, a])
+                lost -= half_dt * dash[k] * opening / np.sqrt(d2)
+                dash[k] = 0.0
+    return lost

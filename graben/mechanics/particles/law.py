@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from graben.errors import Refused
+from graben.mechanics.particles.dispatch import LawTables, LinearTable
 
 Floats = NDArray[np.float64]
 
@@ -41,14 +42,8 @@ class LinearLaw:
     shear_damping: float = 0.3
 
     mass: Floats = field(init=False)  # (c,) kg
-    pair_kn: Floats = field(init=False)  # (c, c) N/m
-    pair_cn: Floats = field(init=False)  # (c, c) N s/m
-    pair_kt: Floats = field(init=False)
-    pair_ct: Floats = field(init=False)
-    wall_kn: Floats = field(init=False)  # (c,)
-    wall_cn: Floats = field(init=False)
-    wall_kt: Floats = field(init=False)
-    wall_ct: Floats = field(init=False)
+    pairs: LinearTable = field(init=False)  # (c, c)
+    walls: LinearTable = field(init=False)  # (c, 1): all walls are of one class
 
     def __post_init__(self) -> None:
         arrays = {
@@ -77,19 +72,17 @@ class LinearLaw:
         kn = k[:, None] * k[None, :] / (k[:, None] + k[None, :])
         kw = k * self.wall_stiffness / (k + self.wall_stiffness)
         kt, kwt = self.shear_ratio * kn, self.shear_ratio * kw
-        tables = {
-            "mass": mass,
-            "pair_kn": kn,
-            "pair_kt": kt,
-            "pair_cn": 2.0 * self.damping * np.sqrt(reduced * kn),
-            "pair_ct": 2.0 * self.shear_damping * np.sqrt(reduced * kt),
-            "wall_kn": kw,
-            "wall_kt": kwt,
-            "wall_cn": 2.0 * self.damping * np.sqrt(mass * kw),
-            "wall_ct": 2.0 * self.shear_damping * np.sqrt(mass * kwt),
-        }
-        for name, table in tables.items():
-            object.__setattr__(self, name, np.ascontiguousarray(table))
+        cn, ct = (2.0 * self.damping * np.sqrt(reduced * kn), 2.0 * self.shear_damping * np.sqrt(reduced * kt))
+        cw, cwt = (2.0 * self.damping * np.sqrt(mass * kw), 2.0 * self.shear_damping * np.sqrt(mass * kwt))
+        object.__setattr__(self, "mass", mass)
+        object.__setattr__(self, "pairs", LinearTable(kn, cn, kt, ct, np.full(kn.shape, float(self.friction))))
+        one_class = [a[:, None] for a in (kw, cw, kwt, cwt, np.full(kw.shape, float(self.wall_friction)))]
+        object.__setattr__(self, "walls", LinearTable(*map(np.ascontiguousarray, one_class)))
+
+    @property
+    def tables(self) -> LawTables:
+        """What the kernels take."""
+        return LawTables(self.pairs, self.walls)
 
     @property
     def rubs(self) -> bool:
@@ -105,20 +98,21 @@ def critical_step(law: LinearLaw) -> float:
     2 / omega (sqrt(1 + xi^2) - xi), where xi = omega c / (2 K) since the dashpots sit beside the springs.
     """
     worst = np.inf
+    pairs, walls = law.pairs, law.walls
     kt_weight = (2.0 + 2.0 / 0.4) if law.rubs else 0.0  # sliding and rolling share of the tangential springs
     for i, r in enumerate(law.radius):
         for j, s in enumerate(law.radius):
             touching = 0.81 * 2.0 / (1.0 - np.sqrt(1.0 - (s / (r + s)) ** 2))  # 12 for equal spheres
-            k = touching / 3.0 * (law.pair_kn[i, j] + kt_weight * law.pair_kt[i, j])
+            k = touching / 3.0 * (pairs.kn[i, j] + kt_weight * pairs.kt[i, j])
             omega = np.sqrt(2.0 * k / law.mass[i])
             beta = max(
-                law.pair_cn[i, j] / law.pair_kn[i, j],
-                law.pair_ct[i, j] / law.pair_kt[i, j] if law.rubs and law.shear_ratio > 0 else 0.0,
+                pairs.cn[i, j] / pairs.kn[i, j],
+                pairs.ct[i, j] / pairs.kt[i, j] if law.rubs and law.shear_ratio > 0 else 0.0,
             )
             xi = 0.5 * omega * beta
             worst = min(worst, 2.0 / omega * (np.sqrt(1.0 + xi * xi) - xi))
-        k = 2.0 * (law.wall_kn[i] + kt_weight * law.wall_kt[i])
+        k = 2.0 * (walls.kn[i, 0] + kt_weight * walls.kt[i, 0])
         omega = np.sqrt(k / law.mass[i])
-        xi = 0.5 * omega * law.wall_cn[i] / law.wall_kn[i]
+        xi = 0.5 * omega * walls.cn[i, 0] / walls.kn[i, 0]
         worst = min(worst, 2.0 / omega * (np.sqrt(1.0 + xi * xi) - xi))
     return float(worst)

@@ -52,16 +52,19 @@ def cell_order(x, low, size, counts):
 
 
 @kernel
-def half_list(x, radius, width, periodic, start, counts, skin, first, partner):
+def half_list(bodies, period, start, counts, skin, first, partner):
     """Fill first (n + 1,) and partner (capacity,) int32 with the pairs closer than r_i + r_j + skin.
 
-    x, radius must be in cell order. Returns the number of pairs; when it exceeds the capacity, partner is full and
-    the caller must enlarge it and call again.
+    bodies must be in cell order; period (2,) m of the sides or None. Returns the number of pairs; when it exceeds
+    the capacity, partner is full and the caller must enlarge it and call again.
     """
+    x, radius = bodies.position, bodies.radius
     nx, ny, nz = counts[0], counts[1], counts[2]
     capacity = partner.shape[0]
     found = 0
-    hx, hy = 0.5 * width[0], 0.5 * width[1]
+    if period is not None:
+        wx, wy = period[0], period[1]
+        hx, hy = 0.5 * wx, 0.5 * wy
     for cx in range(nx):
         for cy in range(ny):
             for cz in range(nz):
@@ -82,7 +85,7 @@ def half_list(x, radius, width, periodic, start, counts, skin, first, partner):
                         ex, ey, ez = cx + dx, cy + dy, cz + dz
                         if ez < 0 or ez >= nz:
                             continue
-                        if periodic:
+                        if period is not None:
                             ex = ex % nx
                             ey = ey % ny
                         elif ex >= nx or ey < 0 or ey >= ny:
@@ -91,15 +94,15 @@ def half_list(x, radius, width, periodic, start, counts, skin, first, partner):
                         begin = i + 1 if ahead == 0 else start[d]
                         for j in range(begin, start[d + 1]):
                             gx, gy, gz = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
-                            if periodic:
+                            if period is not None:
                                 if gx > hx:
-                                    gx -= width[0]
+                                    gx -= wx
                                 elif gx < -hx:
-                                    gx += width[0]
+                                    gx += wx
                                 if gy > hy:
-                                    gy -= width[1]
+                                    gy -= wy
                                 elif gy < -hy:
-                                    gy += width[1]
+                                    gy += wy
                             limit = reach + radius[j]
                             if gx * gx + gy * gy + gz * gz < limit * limit:
                                 if found < capacity:
@@ -110,12 +113,13 @@ def half_list(x, radius, width, periodic, start, counts, skin, first, partner):
 
 
 @kernel
-def carry_history(old_first, old_partner, old_slip, old_place, identity, first, partner, slip):
-    """Copy tangential contact forces from an old list to a new one.
+def carry_history(old, old_place, identity, first, partner, slip):
+    """Copy tangential contact forces from an old list, a record of Contacts, to a new one.
 
     old_place (n,): where the particle with a given identity stood in the old order; slip (pairs, 3) is the force on
     the first particle of the pair, so it changes sign when the pair is stored the other way round.
     """
+    old_first, old_partner, old_slip = old.first, old.partner, old.slip
     n = first.shape[0] - 1
     for i in range(n):
         a = old_place[identity[i]]

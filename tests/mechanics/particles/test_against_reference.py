@@ -120,31 +120,33 @@ def test_trajectories(friction, periodic):
     rng = np.random.Generator(np.random.PCG64(5))
     slow.v[:] = rng.normal(size=x.shape) * 0.5
     slow.spin[:] = rng.normal(size=x.shape) * (200.0 if friction else 0.0)
-    fast.v[:], fast.spin[:] = slow.v[fast.identity], slow.spin[fast.identity]
+    fast.bodies.velocity[:], fast.bodies.spin[:] = slow.v[fast.bodies.identity], slow.spin[fast.bodies.identity]
     for _ in range(150):
         slow.step()
     fast.advance(150)
     assert fast.rebuilds > 2
     assert slow.history or not friction
-    ours = fast.by_identity(fast.x)
+    ours = fast.by_identity(fast.bodies.position)
     difference = ours - slow.x
     if periodic:
         difference[:, :2] -= np.array(width) * np.rint(difference[:, :2] / width)
     assert np.abs(slow.x - x).max() > 1e-4  # something happened
     np.testing.assert_allclose(difference, 0.0, atol=1e-12)
-    np.testing.assert_allclose(fast.by_identity(fast.v), slow.v, atol=1e-9)
-    np.testing.assert_allclose(fast.by_identity(fast.spin), slow.spin, atol=1e-6)
+    np.testing.assert_allclose(fast.by_identity(fast.bodies.velocity), slow.v, atol=1e-9)
+    np.testing.assert_allclose(fast.by_identity(fast.bodies.spin), slow.spin, atol=1e-6)
 
 
 def test_half_list_holds_each_close_pair_once():
     law, x, kind, width = crowd(0.0)
     box = Assembly(law, x, kind, width, skin=0.3)
-    d = box.x[:, None] - box.x[None]
+    d = box.bodies.position[:, None] - box.bodies.position[None]
     d[..., :2] -= np.array(width) * np.rint(d[..., :2] / width)
-    near = np.linalg.norm(d, axis=-1) < box.radius[:, None] + box.radius[None] + 0.3 * 0.6e-3
+    near = np.linalg.norm(d, axis=-1) < box.bodies.radius[:, None] + box.bodies.radius[None] + 0.3 * 0.6e-3
     expected = {(i, j) for i, j in zip(*np.nonzero(near)) if i < j}
     found = [
-        (min(i, int(j)), max(i, int(j))) for i in range(len(x)) for j in box.partner[box.first[i] : box.first[i + 1]]
+        (min(i, int(j)), max(i, int(j)))
+        for i in range(len(x))
+        for j in box.contacts.partner[box.contacts.first[i] : box.contacts.first[i + 1]]
     ]
     assert len(found) == len(set(found))
     assert set(found) == expected

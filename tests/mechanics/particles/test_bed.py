@@ -114,8 +114,8 @@ def test_a_grain_jammed_between_rough_walls_hangs_on_them():
     weight = rough.mass[0] * 9.81
     assert state.wall_lift == pytest.approx(weight, rel=1e-6)
     assert state.floor_push == 0.0 and floor_force.sum() == 0.0
-    sunk = weight / (4.0 * rough.wall_kt[0])
-    assert box.x[0, 2] == pytest.approx(2 * D - sunk, abs=1e-3 * sunk)
+    sunk = weight / (4.0 * rough.walls.kt[0, 0])
+    assert box.bodies.position[0, 2] == pytest.approx(2 * D - sunk, abs=1e-3 * sunk)
 
 
 @pytest.mark.parametrize("walls", [True, False])

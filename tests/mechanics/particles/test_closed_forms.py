@@ -31,12 +31,12 @@ def test_restitution_of_two_spheres(ratio):
         law(damping=ratio), np.array([[9e-3, 0.01, 0.01], [11.1e-3, 0.01, 0.01]]), np.zeros(2), (0.02, 0.02),
         gravity=0.0, safety=0.005,
     )  # fmt: skip
-    box.v[:, 0] = np.where(box.identity == 0, 0.1, -0.1)
+    box.bodies.velocity[:, 0] = np.where(box.bodies.identity == 0, 0.1, -0.1)
     before = box.energy()["total"]
     box.advance(80_000)
     w = np.sqrt(1.0 - ratio**2)
     expected = np.exp(-ratio / w * (np.pi - np.arctan2(2.0 * ratio * w, 1.0 - 2.0 * ratio**2)))
-    v = box.by_identity(box.v)[:, 0]
+    v = box.by_identity(box.bodies.velocity)[:, 0]
     assert v[1] > 0.0
     assert v[1] / 0.1 == pytest.approx(expected, rel=3e-3)
     assert v.sum() == pytest.approx(0.0, abs=1e-12)
@@ -50,14 +50,14 @@ def test_sliding_sphere_starts_to_roll():
     box = Assembly(
         law(friction=mu, wall_friction=mu), np.array([[5e-3, 0.01, R - rest]]), np.zeros(1), (0.02, 0.02), gravity=g
     )
-    box.v[0, 0] = v0
+    box.bodies.velocity[0, 0] = v0
     start = 2.0 * v0 / (7.0 * mu * g)
     box.advance(round(0.5 * start / box.dt))
-    assert box.v[0, 0] == pytest.approx(v0 - mu * g * box.time, rel=1e-3)
-    assert box.spin[0, 1] * R == pytest.approx(2.5 * mu * g * box.time, rel=2e-3)
+    assert box.bodies.velocity[0, 0] == pytest.approx(v0 - mu * g * box.time, rel=1e-3)
+    assert box.bodies.spin[0, 1] * R == pytest.approx(2.5 * mu * g * box.time, rel=2e-3)
     box.advance(round(1.5 * start / box.dt))
-    assert box.v[0, 0] == pytest.approx(5.0 / 7.0 * v0, rel=1e-3)
-    assert box.spin[0, 1] * R == pytest.approx(box.v[0, 0], rel=1e-3)
+    assert box.bodies.velocity[0, 0] == pytest.approx(5.0 / 7.0 * v0, rel=1e-3)
+    assert box.bodies.spin[0, 1] * R == pytest.approx(box.bodies.velocity[0, 0], rel=1e-3)
     energy = box.energy()
     assert energy["friction"] == pytest.approx(law().mass[0] * v0**2 / 7.0, rel=5e-3)  # 2/7 of the kinetic energy
 
@@ -71,7 +71,7 @@ def test_column_stands_with_its_weight():
     survey, floor, touching = box.survey()
     assert survey.floor_push == pytest.approx(count * weight, rel=1e-9)
     assert np.count_nonzero(floor) == 1
-    pair, normal, push = box.contacts()
+    pair, normal, push = box.touching()
     below = pair.min(axis=1)
     np.testing.assert_allclose(push[np.argsort(below)], weight * np.arange(count - 1, 0, -1), rtol=1e-8)
     np.testing.assert_allclose(np.abs(normal[:, 2]), 1.0)
@@ -88,7 +88,7 @@ def crowd(rubbing: float, damping: float, **options) -> Assembly:
     width = (10e-3, 10e-3)
     x = insert(pair.radius[kind], width, 13e-3, rng)
     box = Assembly(pair, x, kind, width, **options)
-    box.v[:] = 0.4 * rng.normal(size=x.shape)
+    box.bodies.velocity[:] = 0.4 * rng.normal(size=x.shape)
     return box
 
 
@@ -115,12 +115,14 @@ def test_ledger_with_dissipation(rubbing):
 @pytest.mark.parametrize("rubbing", [0.0, 0.5])
 def test_momentum_of_a_gas_without_gravity(rubbing):
     box = crowd(rubbing, 0.2, gravity=0.0)
-    box.x[:, 2] += 1.0  # far from the floor
+    box.bodies.position[:, 2] += 1.0  # far from the floor
     box._rebuild()
-    mass = box.law.mass[box.kind]
-    before = mass @ box.v
+    mass = box.law.mass[box.bodies.kind]
+    before = mass @ box.bodies.velocity
     box.advance(2000)
-    np.testing.assert_allclose(box.law.mass[box.kind] @ box.v, before, atol=1e-12 * np.abs(mass).sum())
+    np.testing.assert_allclose(
+        box.law.mass[box.bodies.kind] @ box.bodies.velocity, before, atol=1e-12 * np.abs(mass).sum()
+    )
 
 
 def test_same_seed_same_bits():
@@ -128,8 +130,8 @@ def test_same_seed_same_bits():
     first.advance(1500)
     for _ in range(15):  # how a run is cut into pieces does not matter either
         second.advance(100)
-    assert first.x.tobytes() == second.x.tobytes()
-    assert first.spin.tobytes() == second.spin.tobytes()
+    assert first.bodies.position.tobytes() == second.bodies.position.tobytes()
+    assert first.bodies.spin.tobytes() == second.bodies.spin.tobytes()
 
 
 def test_stable_step_is_not_far_from_the_real_limit():
@@ -143,9 +145,9 @@ def test_stable_step_is_not_far_from_the_real_limit():
         box = Assembly(law(damping=0.0), x, np.zeros(len(x)), (8 * spacing, 8 * spacing), gravity=0.0, safety=1.0)
         box.dt *= factor
         rng = np.random.Generator(np.random.PCG64(2))
-        box.v[:] = 1e-5 * rng.normal(size=x.shape)
+        box.bodies.velocity[:] = 1e-5 * rng.normal(size=x.shape)
         box.advance(60)
-        steady[factor] = float(np.abs(box.v).max()) < 1.0
+        steady[factor] = float(np.abs(box.bodies.velocity).max()) < 1.0
     assert steady == {0.9: True, 2.2: False}
 
 
