@@ -26,7 +26,6 @@ from graben.mechanics.blocks.engine.records import (
     SPEED,
     SPEED_STEP,
     Rules,
-    Skeleton,
     private,
 )
 from graben.mechanics.blocks.engine.state import ModelState
@@ -98,24 +97,11 @@ class BlockModel(ModelState):
         self.dt = made.dt
         self.zone_area, self.true_mass = made.area, made.true_mass
         self.mass_ratio = made.mass / made.true_mass
-        nv = len(bodies.position)
-        self.held = np.zeros((nv, 2), dtype=bool)
+        self.held = np.zeros((len(bodies.position), 2), dtype=bool)
         self.removed = np.zeros(len(bodies.block_area), dtype=bool)
         self.excavated = 0.0
         self.weight = self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :]
-        self.skeleton = Skeleton(
-            made.zones,
-            self.skin.first.astype(np.int32),
-            self.skin.second.astype(np.int32),
-            self.skin.weight,
-            self.skin.follow.astype(np.int32),
-            made.mass,
-            np.empty((0, 2), dtype=np.int64),
-            np.zeros(len(self.parts.node), dtype=np.int64),
-            np.zeros((nv, 2)),
-            self.weight.copy(),
-            np.zeros((nv, 2)),
-        )
+        self.skeleton = setup.unloaded(self.skin, self.parts, made, self.weight)
         size = float(np.sqrt(np.median(bodies.block_area)))
         self.block_size = size
         self.reach = 0.08 * size
@@ -195,7 +181,7 @@ class BlockModel(ModelState):
             self.time += done * self.dt
             self._refuse_lost_zones()
             if status == relaxation.REBUILD:
-                if done == 0 and self._stuck():
+                if done == 0 and not np.isfinite(self.motion.x).all():
                     raise NumericsFailed("a position is not finite", step=self.steps_done, advice=_SLOWER)
                 self.rebuild()
             elif status == relaxation.RUNAWAY:
@@ -240,9 +226,6 @@ class BlockModel(ModelState):
                 advice=_SLOWER,
             )
 
-    def _stuck(self) -> bool:
-        return not bool(np.all(np.isfinite(self.motion.x)))
-
     def hold(self, vertices: np.ndarray, axis: int, speed: float = 0.0) -> None:
         """Prescribe the velocity [m/s] of vertices (indices or mask) along an axis (0: x, 1: y)."""
         self.held[vertices, axis] = True
@@ -274,6 +257,10 @@ class BlockModel(ModelState):
     def set_speed(self, factor: float, per_step: float = 0.0) -> None:
         """Prescribed velocities count `factor` times in the next step, and by `per_step` more after each, up to 1."""
         self.motion.drive[SPEED], self.motion.drive[SPEED_STEP] = factor, per_step
+
+    def add_time(self, seconds: float) -> None:
+        """Time of loading that the last steps stood for beyond their own."""
+        self.time += seconds
 
     def press(self, edges: np.ndarray, normal_stress: float, rising: bool = False) -> None:
         """Add a normal stress [Pa, tension positive] on outline edges (indices or mask), as steady or rising load.

@@ -199,6 +199,7 @@ def advance(me, board, plan, sums, m, steps, s, parts, pairs, joints, rules):
     """
     dt, near, dilation, deepest, local = rules.dt, rules.near, rules.dilation, rules.deepest, rules.local
     damping_ratio, damping_limit = rules.damping_ratio, rules.damping_limit
+    skin, fastest = rules.reach, rules.most_energy
     first = plan.first[me]
     stop = plan.first[me + 1]
     pushes, pushed = plan.pushes, plan.pushed
@@ -211,7 +212,7 @@ def advance(me, board, plan, sums, m, steps, s, parts, pairs, joints, rules):
             arrive(board, me, turn)
             if not all_there(board, turn):
                 return LEFT_ALONE, step, -1
-            if not _worst(m.farthest[:, 0]) < (0.5 * rules.reach) ** 2:
+            if not _worst(m.farthest[:, 0]) < (0.5 * skin) ** 2:
                 return REBUILD, step, -1
             for p in range(first, stop):
                 look_again(p, parts, pairs, s.follow, m.node, near, dilation, m)
@@ -245,6 +246,6 @@ def advance(me, board, plan, sums, m, steps, s, parts, pairs, joints, rules):
         if bad >= 0:
             m.ledger[LARGEST_OVERLAP] = now[:, AT_OVERLAP].max()
             return DEEP_OVERLAP, step, bad
-        if not _gather(m, now, damping_ratio, damping_limit, alpha, dt) < rules.most_energy:
+        if not _gather(m, now, damping_ratio, damping_limit, alpha, dt) < fastest:
             return RUNAWAY, step, -1
     return DONE, steps, -1

@@ -12,7 +12,7 @@ from graben.mechanics.blocks.contact.joints import RIM_SHARE, Joint
 from graben.mechanics.blocks.contact.nodes import COLUMNS, RIM
 from graben.mechanics.blocks.contact.search import no_pairs
 from graben.mechanics.blocks.contact.sleeping import fresh_sleep
-from graben.mechanics.blocks.engine.records import DRIVE_SLOTS, LEDGER_SLOTS, Motion
+from graben.mechanics.blocks.engine.records import DRIVE_SLOTS, LEDGER_SLOTS, Motion, Skeleton
 from graben.mechanics.blocks.shape.bodies import Bodies, Skin
 from graben.mechanics.blocks.shape.partition import Parts, runs
 from graben.mechanics.blocks.zones.elastic import ElasticZones, lame, shape_gradients, stiffness_row_sums
@@ -106,6 +106,23 @@ def sets_of_edges(
     if between.shape != (len(sets),) * 2 or not np.isin(between, sets).all() or np.any(between != between.T):
         raise ValueError(f"set_between: expected a symmetric table {len(sets)} x {len(sets)} of joint sets")
     return given.astype(np.int64), np.ascontiguousarray(between, dtype=np.int64)
+
+
+def unloaded(skin: Skin, parts: Parts, made: Made, weight: np.ndarray) -> Skeleton:
+    """Skeleton that nothing holds and nothing but its weight (vertices, 2) [N/m] loads."""
+    return Skeleton(
+        made.zones,
+        skin.first.astype(np.int32),
+        skin.second.astype(np.int32),
+        skin.weight,
+        skin.follow.astype(np.int32),
+        made.mass,
+        np.empty((0, 2), dtype=np.int64),
+        np.zeros(len(parts.node), dtype=np.int64),
+        np.zeros(weight.shape),
+        weight.copy(),
+        np.zeros(weight.shape),
+    )
 
 
 def at_rest(bodies: Bodies, skin: Skin, parts: Parts) -> Motion:

@@ -140,7 +140,7 @@ def compress(
             if stop_loose:
                 model.calm_loose_blocks()
             if paced is not None:
-                model.time += (rate - 1.0) * taken * model.dt
+                model.add_time((rate - 1.0) * taken * model.dt)
                 paced[0].look(model, paced[1], b.vertex_side[:, sides.bottom], top)
         yield k
 
