@@ -139,6 +139,19 @@ def test_a_moving_wall_does_work():
     assert energy["total"] == pytest.approx(0.0, abs=5e-3 * energy["kinetic"])
 
 
+def test_a_wall_from_afar_is_felt():
+    """A plane comes to a sphere at rest, from many skins away, while the neighbour list holds."""
+    box = Assembly(
+        law(0.0), np.array([[30e-3, 0.0, 0.0]]), np.zeros(1), (1.0, 1.0), periodic=False, gravity=0.0, skin=0.02,
+        walls=planes([[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], [[0.5, 0.0, 0.0]]),
+    )  # fmt: skip
+    box.advance(round(0.05 / box.dt))  # the wall goes 25 mm of the 29 mm: not yet
+    assert box.bodies.velocity[0, 0] == 0.0 and box.rebuilds == 1
+    box.advance(round(0.03 / box.dt))
+    assert box.bodies.velocity[0, 0] > 0.5
+    assert box.bodies.position[0, 0] - box.walls.point[0, 0] > R
+
+
 @pytest.mark.parametrize(
     ("point", "normal", "words"),
     [
