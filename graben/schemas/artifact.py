@@ -58,6 +58,7 @@ class Layout:
     """What an artifact of one kind holds. `version` grows when a reader of the old one would fail.
 
     attributes : global attributes with their values; own_attributes : those that differ from run to run, by type
+    filled : dims of which there is at least one, so that readers may ask for the first and the last
     """
 
     kind: str
@@ -67,6 +68,7 @@ class Layout:
     variables: Mapping[str, Variable]
     attributes: Mapping[str, str] = field(default_factory=dict)
     own_attributes: Mapping[str, type] = field(default_factory=dict)
+    filled: tuple[str, ...] = ()
 
 
 def write_artifact(
@@ -240,7 +242,8 @@ def _faults(file: str, size: int, dataset: xarray.Dataset, accepted: list[str], 
 
 
 def _variable_faults(file: str, declared: Layout, dataset: xarray.Dataset, partial: bool) -> list[Fault]:
-    faults = []
+    faults = [Fault(file, dim, "0", f"at least one: {declared.dims[dim]}") for dim in declared.filled
+              if dataset.sizes.get(dim) == 0]  # fmt: skip
     for name, variable in declared.variables.items():
         if name not in dataset.variables:
             if not variable.optional:

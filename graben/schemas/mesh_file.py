@@ -52,6 +52,11 @@ def read_plane_mesh(path: Path) -> PlaneMesh:
     faults, quads = [], []
     for block in blocks:
         if block.kind in _CORNERS:
+            if len(block.corners) and block.corners.shape[1] <= max(_CORNERS[block.kind]):
+                expected = f"at least {max(_CORNERS[block.kind]) + 1} corners a cell"
+                faults.append(
+                    Fault(str(path), "cells", f"{block.name} of {block.corners.shape[1]} corners", expected)
+                )
             quads.append(block)
         elif block.kind.startswith(("vertex", "line")):
             notes.append(f"{len(block.corners)} cells of kind {block.name} are left out")

@@ -135,7 +135,8 @@ def damage_dataset(rng: random.Random, source: Path, target: Path) -> None:
         if chance < 0.5:
             values = damaged_array(rng, old.values)
             dims = old.dims if values.shape == old.shape else [f"{name}_{k}" for k in range(values.ndim)]
-            data = data.drop_vars(name).assign({name: (dims, values, old.attrs)})
+            if not (values.ndim == 0 and name in data.dims):  # which NetCDF can hold, but xarray cannot
+                data = data.drop_vars(name).assign({name: (dims, values, old.attrs)})
         elif chance < 0.6:
             data = data.drop_vars(name)
         elif chance < 0.7 and old.ndim:

@@ -105,6 +105,15 @@ def test_arrays_that_do_not_fit_the_layout_are_a_program_fault(tmp_path):
         write(tmp_path / "a.nc", force=np.zeros((2, 2)))
 
 
+def test_a_run_without_states_is_none(tmp_path, monkeypatch):
+    timed = replace(
+        LAYOUT, dims={"time": "states"}, variables={"load": Variable(("time",), "N", "force")}, filled=("time",)
+    )
+    monkeypatch.setattr(kinds, "layout", lambda kind: timed)
+    write_artifact(tmp_path / "a.nc", timed, {"load": np.zeros(0)}, Record.begin())
+    assert "at least one: states" in check_artifact(tmp_path / "a.nc")[0].expected
+
+
 def test_each_kind_of_broken_file_is_named(tmp_path):
     import xarray
 

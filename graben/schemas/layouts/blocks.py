@@ -20,6 +20,7 @@ LAYOUT = Layout(
     kind="blocks",
     version=1,
     title="Jointed rock as deformable blocks",
+    filled=("time", "vertex", "block"),
     dims={
         "time": "saved states; the first is the start of loading, after consolidation",
         "vertex": "grid points; each block owns its own",

@@ -18,6 +18,7 @@ LAYOUT = Layout(
     kind="calibration",
     version=1,
     title="Parameters of a constitutive law from stress-strain curves",
+    filled=("parameter", "curve"),
     dims={
         "parameter": "free parameters, in the order of the scene",
         "other": "the same, as columns of matrices",

@@ -18,6 +18,7 @@ LAYOUT = Layout(
     kind="curves",
     version=1,
     title="Average stress and strain over time",
+    filled=("path", "step"),
     dims={
         "path": "one REV of one simulation, or one laboratory or reference test",
         "step": "saved states of a path; shorter paths are padded with nan after step_count",

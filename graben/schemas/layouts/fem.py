@@ -17,6 +17,7 @@ LAYOUT = Layout(
     kind="fem",
     version=1,
     title="Plane-strain finite elements: states, load history, surface",
+    filled=("time", "node"),
     dims={
         "time": "saved states; the first is the equilibrium under gravity",
         "node": "mesh nodes",

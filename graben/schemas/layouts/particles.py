@@ -15,6 +15,7 @@ LAYOUT = Layout(
     kind="particles",
     version=1,
     title="Beds of spheres pressed on a floor",
+    filled=("class", "bed", "particle", "state"),
     dims={
         "class": "spheres of equal radius and density",
         "bed": "realizations, each from its own seed",

@@ -79,6 +79,7 @@ LAYOUT = Layout(
     kind="rev-study",
     version=1,
     title="Average properties by size and place of the representative area",
+    filled=("radius", "centre"),
     dims={
         "radius": "radii, rising",
         "centre": "places",

@@ -25,6 +25,7 @@ LAYOUT = Layout(
     kind="scratch",
     version=1,
     title="Scratch by a rigid grain",
+    filled=("time",),
     dims={
         "time": "refresh intervals of the run",
         "phase": "indent, slide (where there is a path), lift, rest",

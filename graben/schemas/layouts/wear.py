@@ -10,6 +10,7 @@ LAYOUT = Layout(
     kind="wear",
     version=1,
     title="Wear rate of a tool by mixtures of grains",
+    filled=("mixture",),
     dims={"mixture": "a mixture of grain classes", "class": "a size of grain"},
     variables={
         "mixture_name": Variable(("mixture",), "1", "name of the mixture", dtype="U"),

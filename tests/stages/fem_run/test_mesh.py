@@ -256,6 +256,16 @@ def test_corners_that_name_no_node_are_bad_input(tmp_path):
     assert "node 9" in refused(tmp_path / "a.vtk")
 
 
+def test_quads_of_three_corners_are_bad_input(tmp_path, monkeypatch):
+    # Damaged files of gmsh come so from the library that reads them.
+    points, quads = block()
+    mesh = meshio.Mesh(points, [("quad", quads)])
+    mesh.write(tmp_path / "a.vtu")
+    mesh.cells[0].data = mesh.cells[0].data[:, :3]
+    monkeypatch.setattr("meshio.read", lambda path, file_format=None: mesh)
+    assert "quad of 3 corners" in refused(tmp_path / "a.vtu")
+
+
 def test_a_mesh_in_millimetres_is_refused_with_both_sizes(tmp_path):
     points, quads = block()
     meshio.Mesh(1000.0 * points, [("quad", quads)]).write(tmp_path / "a.vtu")

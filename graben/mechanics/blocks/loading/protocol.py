@@ -52,7 +52,8 @@ def refuse_unlike(state: State, own: State, changing: Iterable[str] = ()) -> Non
     for name, values in own.items():
         found, like = state.get(name), np.asarray(values)
         skip = 1 if name in changing else 0
-        if found is None or found.dtype.kind != like.dtype.kind or found.shape[skip:] != like.shape[skip:]:
+        alike = found is not None and found.dtype.kind == like.dtype.kind and found.ndim == like.ndim
+        if found is None or not alike or found.shape[skip:] != like.shape[skip:]:
             raise Refused(f"test.{name}: shape {like.shape} of {like.dtype}")
         if found.dtype.kind == "f" and np.isnan(found).any():
             raise Refused(f"test.{name}: numbers")

@@ -108,10 +108,11 @@ class History:
         """Take up the states of `stored`. Refused where they are not those of a model like this one."""
         like = History(self.model, bool(self.optional))
         like.save()
-        states = len(stored.get("time", ()))
+        states = np.size(stored.get("time", ()))
         for name, own in like.stored(1).items():
             found = stored.get(name)
-            if found is None or found.dtype != own.dtype or found.shape[1:] != own.shape[1:]:
+            alike = found is not None and found.dtype == own.dtype and found.ndim == own.ndim
+            if found is None or not alike or found.shape[1:] != own.shape[1:]:
                 raise Refused(f"history.{name}: shape (..., {own.shape[1:]}) of {own.dtype}")
             if name in ("reference", "start_time") and found.shape != own.shape:
                 raise Refused(f"history.{name}: shape {own.shape}")

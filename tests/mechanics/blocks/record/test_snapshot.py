@@ -119,6 +119,8 @@ def test_a_damaged_state_is_refused(saved, change):
         lambda state: state.pop("energy.rows"),
         lambda state: state.update({"velocity.rows": state["velocity.rows"][:, :-1]}),
         lambda state: state.update(time=np.zeros(0)),
+        lambda state: state.update(time=np.array(0.0)),
+        lambda state: state.update({"contact_pair.rows": np.array(0)}),
     ],
 )
 def test_damaged_states_of_the_past_are_refused(saved, change):
