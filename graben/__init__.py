@@ -5,9 +5,6 @@ Public names are imported when they are first used, so that ``import graben`` co
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
 __version__ = "0.1.0"
 
 _HOME = {
@@ -45,7 +42,10 @@ _HOME = {
     "NumericsFailed": "graben.errors",
 }
 
+TYPE_CHECKING = False  # checkers know it by its name; `typing` costs more to import than all else here
 if TYPE_CHECKING:
+    from typing import Any
+
     from graben.api import mesh as mesh
     from graben.api.artifacts import Provenance as Provenance
     from graben.api.artifacts import open as open
@@ -85,6 +85,8 @@ __all__ = sorted([*_HOME, "__version__"])
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'graben' has no attribute {name!r}")
+    from importlib import import_module
+
     home = import_module(_HOME[name])
     value = import_module("graben.api.mesh") if name == "mesh" else getattr(home, name)
     globals()[name] = value
