@@ -17,6 +17,7 @@ from graben.mechanics.blocks.contact.nodes import node_motion
 from graben.mechanics.blocks.contact.sleeping import fresh_sleep
 from graben.mechanics.blocks.engine import motion, relaxation, setup
 from graben.mechanics.blocks.engine.records import (
+    BRAKE,
     DAMPED,
     DAMPING,
     KINETIC,
@@ -87,7 +88,8 @@ class BlockModel(ModelState):
         self.joint_table = joint_table(self.joints)
         rock = setup.Rock(young, poisson, density, strength, rigid)
         setup.refuse_unsound(rock, self.joints)
-        made = setup.zones_and_masses(bodies, rock, self.joints, dt)
+        self.damping = damping or Damping()
+        made = setup.zones_and_masses(bodies, rock, self.joints, dt, self.damping.local)
         given, self._set_of = setup.sets_of_edges(bodies, len(self.joints), edge_set, set_between)
         self.bodies = bodies
         self.skin = chamfered_skin(bodies, rounding)
@@ -96,7 +98,8 @@ class BlockModel(ModelState):
         self.threads = threads
         self.dt = made.dt
         self.zone_area, self.true_mass = made.area, made.true_mass
-        self.mass_ratio = made.mass / made.true_mass
+        self.masses, self.scaled = made.mass, dt is not None
+        self.mass_ratio = made.mass.moving / np.add.reduceat(made.true_mass, made.mass.first[:-1])
         self.held = np.zeros((len(bodies.position), 2), dtype=bool)
         self.removed = np.zeros(len(bodies.block_area), dtype=bool)
         self.excavated = 0.0
@@ -109,7 +112,7 @@ class BlockModel(ModelState):
         self.deepest = 0.1 * size
         # A vertex that crosses a block in a few dozen steps has run away.
         self.fastest = 0.02 * size / self.dt
-        self.most_energy = 10.0 * float(np.median(made.mass)) * self.fastest**2
+        self.most_energy = 10.0 * float(np.median(made.mass.vertex)) * self.fastest**2
         self._low = bodies.position.min(axis=0) - size
         self._span = np.ptp(bodies.position, axis=0) + 2.0 * size
         self.motion = setup.at_rest(bodies, self.skin, self.parts)
@@ -117,7 +120,7 @@ class BlockModel(ModelState):
         self.steps_done = 0
         self.time = 0.0
         self.rebuilds = 0
-        self.damping = damping or Damping()
+        self._weigh()
         self.motion.drive[DAMPING] = self._first_coefficient(self.damping)
         self.rebuild(first=intact)
 
@@ -129,6 +132,7 @@ class BlockModel(ModelState):
         if damping.ratio < 0 or self.damping.ratio < 0:
             self.motion.drive[DAMPING] = self._first_coefficient(damping)
         self.damping = damping
+        self._weigh()
 
     def rebuild(self, first: bool = False) -> None:
         """Find the candidate contacts anew; joints found at the `first` call are intact."""
@@ -245,14 +249,22 @@ class BlockModel(ModelState):
             still = np.argwhere(self.held)
             start = np.searchsorted(still[:, 0], self.parts.vertex).astype(np.int64)
             self.skeleton = self.skeleton._replace(still=still, still_start=start)
+            self._weigh()
+
+    def _weigh(self) -> None:
+        """Masses by constraints and damping; local damping looks at vertices, not at blocks."""
+        local = self.damping.local
+        mass = self.masses.plain(local, self.scaled) if local > 0.0 else self.masses.held(self.skeleton.still[:, 0])
+        self.skeleton = self.skeleton._replace(mass=mass)
 
     def set_load(self, factor: float, per_step: float = 0.0) -> None:
         """The rising load counts `factor` times now, and by `per_step` more after each step."""
         self.motion.drive[LOAD], self.motion.drive[LOAD_STEP] = factor, per_step
 
-    def raise_load(self, per_step: float) -> None:
-        """The rising load grows from where it is by `per_step` a step; 0: it stays."""
-        self.motion.drive[LOAD_STEP] = per_step
+    def raise_load(self, per_step: float, brake: float = 0.0) -> None:
+        """The rising load grows from where it is by `per_step` a step, and falls by `brake` times its way; 0: it
+        stays."""
+        self.motion.drive[LOAD_STEP], self.motion.drive[BRAKE] = per_step, brake
 
     def set_speed(self, factor: float, per_step: float = 0.0) -> None:
         """Prescribed velocities count `factor` times in the next step, and by `per_step` more after each, up to 1."""

@@ -7,87 +7,190 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba.extending import overload
 
+from graben.mechanics.blocks.engine.masses import LESS, LESS_TURN, LIGHTER, NIMBLER, WHOLE
 from graben.mechanics.blocks.zones.elastic import ElasticZones, zone_forces
 from graben.mechanics.blocks.zones.plastic import PlasticZones, plastic_zone_forces
 from graben.mechanics.blocks.zones.rigid import RigidBlocks, move_rigid_blocks
 from graben.mechanics.compiled import kernel
 
-# Columns of what each part adds up (one cache line a part): friction work, largest overlap, kinetic energy, powers
-# of damping, loads and walls; the pair that overlaps too far; plastic work of the zones.
-AT_FRICTION, AT_OVERLAP, AT_KINETIC, AT_DAMPED, AT_LOAD, AT_WALL, AT_DEEP, AT_PLASTIC = range(8)
-COLUMNS = 8
+# Columns of what each part adds up (two cache lines a part): friction work, largest overlap, kinetic energy, powers
+# of damping, loads and walls; the pair that overlaps too far; plastic work of the zones; power of the rising load
+# per unit of it.
+AT_FRICTION, AT_OVERLAP, AT_KINETIC, AT_DAMPED, AT_LOAD, AT_WALL, AT_DEEP, AT_PLASTIC, AT_RISE = range(9)
+COLUMNS = 16
+
+
+@kernel(error_model="numpy")
+def _resisted(total, old, local):
+    """A force less its local damping, a share of it against the velocity."""
+    drag = local * abs(total)
+    if old > 0.0:
+        return total - drag
+    if old < 0.0:
+        return total + drag
+    return total
 
 
 @kernel(error_model="numpy")
 def move_vertices(p, s, m, parts, load, alpha, local, dt, speed, sums):
     """New velocities and positions in part p; adds up kinetic energy, and the powers of damping, loads and walls.
 
-    Vertices of prescribed velocity move freely in the first loop, which knows no exceptions, and are put right after.
+    Masses are those of `masses.Masses`: each block has a rigid part that is lighter than its vertices.
     """
-    x, v, mass, zone, joint, reaction = m.x, m.v, s.mass, m.zone_force, m.joint_force, m.reaction
-    steady, rising, still, wall = s.steady, s.rising, s.still, s.wall
+    x, v, zone, joint = m.x, m.v, m.zone_force, m.joint_force
+    steady, rising, still = s.steady, s.rising, s.still
+    mass, first, block = s.mass.vertex, s.mass.first, s.mass.block
     slow = 1.0 - 0.5 * alpha * dt
     fast = 1.0 / (1.0 + 0.5 * alpha * dt)
-    kinetic = 0.0
-    damped = 0.0
-    load_work = 0.0
-    wall_work = 0.0
-    for k in range(s.still_start[p], s.still_start[p + 1]):
-        i = still[k, 0]
-        d = still[k, 1]
-        # For now the old velocity is kept here.
-        reaction[i, d] = v[i, d]
-    for i in range(parts.vertex[p], parts.vertex[p + 1]):
-        push = dt / mass[i]
-        half = 0.5 * mass[i]
-        for d in range(2):
-            old = v[i, d]
-            applied = steady[i, d] + load * rising[i, d]
-            total = zone[i, d] + joint[i, d] + applied
+    kinetic, damped, load_work, wall_work, rise = 0.0, 0.0, 0.0, 0.0, 0.0
+    row = s.still_start[p]
+    last_row = s.still_start[p + 1]
+    for b in range(parts.block[p], parts.block[p + 1]):
+        begin, end = first[b], first[b + 1]
+        fx, fy, moment, cx, cy = 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(begin, end):
+            tx = zone[i, 0] + joint[i, 0] + steady[i, 0] + load * rising[i, 0]
+            ty = zone[i, 1] + joint[i, 1] + steady[i, 1] + load * rising[i, 1]
             if local > 0.0:
-                drag = local * abs(total)
-                if old < 0.0:
-                    drag = -drag
-                elif old == 0.0:
-                    drag = 0.0
-                new = (old * slow + (total - drag) * push) * fast
-                damped += 0.5 * drag * (old + new)
-            else:
-                new = (old * slow + total * push) * fast
-            mean = 0.5 * (old + new)
-            damped += 2.0 * alpha * half * mean * mean
-            load_work += applied * mean
-            kinetic += half * new * new
-            v[i, d] = new
-            x[i, d] += dt * new
-    for k in range(s.still_start[p], s.still_start[p + 1]):
-        i = still[k, 0]
-        d = still[k, 1]
-        old = reaction[i, d]
-        free = v[i, d]
-        mean = 0.5 * (old + free)
-        applied = steady[i, d] + load * rising[i, d]
-        total = zone[i, d] + joint[i, d] + applied
-        drag = 0.0
-        if local > 0.0 and old != 0.0:
-            drag = local * abs(total) if old > 0.0 else -local * abs(total)
-        damped -= (alpha * mass[i] * mean + drag) * mean
-        load_work -= applied * mean
-        new = wall[i, d] * speed
-        mean = 0.5 * (old + new)
-        # A wall also carries the inertia of what it moves.
-        reaction[i, d] = mass[i] * (new - old) / dt - total
-        wall_work += reaction[i, d] * mean
-        load_work += applied * mean
-        kinetic += 0.5 * mass[i] * (new * new - free * free)
-        v[i, d] = new
-        x[i, d] += dt * (new - free)
+                tx = _resisted(tx, v[i, 0], local)
+                ty = _resisted(ty, v[i, 1], local)
+            fx += tx
+            fy += ty
+            moment += x[i, 0] * ty - x[i, 1] * tx
+            cx += mass[i] * x[i, 0]
+            cy += mass[i] * x[i, 1]
+        cx /= block[b, WHOLE]
+        cy /= block[b, WHOLE]
+        ax = block[b, LIGHTER] * fx * dt
+        ay = block[b, LIGHTER] * fy * dt
+        mine = row
+        while row < last_row and still[row, 0] < end:
+            row += 1
+        if row > mine:
+            some = _move_held(b, mine, row, s, m, load, alpha, local, dt, speed, ax, ay)
+            kinetic += some[0]
+            damped += some[1]
+            load_work += some[2]
+            wall_work += some[3]
+            rise += some[4]
+            continue
+        spin = block[b, NIMBLER] * (moment - (cx * fy - cy * fx)) * dt
+        # Sums over the block of mass x velocity and of its moment: of the mean and of the new one.
+        qx, qy, qw, px, py, pw = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        square, mean_square = 0.0, 0.0
+        for i in range(begin, end):
+            weight = mass[i]
+            push = dt / weight
+            rx = x[i, 0] - cx
+            ry = x[i, 1] - cy
+            old_x, old_y = v[i, 0], v[i, 1]
+            on_x = steady[i, 0] + load * rising[i, 0]
+            on_y = steady[i, 1] + load * rising[i, 1]
+            tx = zone[i, 0] + joint[i, 0] + on_x
+            ty = zone[i, 1] + joint[i, 1] + on_y
+            if local > 0.0:
+                free_x, free_y = tx, ty
+                tx = _resisted(tx, old_x, local)
+                ty = _resisted(ty, old_y, local)
+            new_x = (old_x * slow + tx * push + ax - spin * ry) * fast
+            new_y = (old_y * slow + ty * push + ay + spin * rx) * fast
+            mean_x = 0.5 * (old_x + new_x)
+            mean_y = 0.5 * (old_y + new_y)
+            if local > 0.0:
+                damped += (free_x - tx) * mean_x + (free_y - ty) * mean_y
+            square += weight * (new_x * new_x + new_y * new_y)
+            mean_square += weight * (mean_x * mean_x + mean_y * mean_y)
+            px += weight * new_x
+            py += weight * new_y
+            pw += weight * (rx * new_y - ry * new_x)
+            qx += weight * mean_x
+            qy += weight * mean_y
+            qw += weight * (rx * mean_y - ry * mean_x)
+            load_work += on_x * mean_x + on_y * mean_y
+            rise += rising[i, 0] * new_x + rising[i, 1] * new_y
+            v[i, 0] = new_x
+            v[i, 1] = new_y
+            x[i, 0] += dt * new_x
+            x[i, 1] += dt * new_y
+        less, turn = block[b, LESS], block[b, LESS_TURN]
+        kinetic += 0.5 * (square - less * (px * px + py * py) - turn * pw * pw)
+        damped += alpha * (mean_square - less * (qx * qx + qy * qy) - turn * qw * qw)
     sums[p, AT_KINETIC] = kinetic
     sums[p, AT_DAMPED] = damped
     sums[p, AT_LOAD] = load_work
     sums[p, AT_WALL] = wall_work
+    sums[p, AT_RISE] = rise
+
+
+@kernel(error_model="numpy")
+def _move_held(b, row, last_row, s, m, load, alpha, local, dt, speed, ax, ay):
+    """Move block b, some of whose velocities are prescribed (rows of s.still); returns what `move_vertices` adds up.
+
+    ax, ay : what the rigid part gets beyond its vertices. Held motion is not damped. The impulses J that walls give
+    along an axis lie in closed form: those of the vertices alone, less g x their sum, with g of the rigid part.
+    """
+    x, v, zone, joint, reaction = m.x, m.v, m.zone_force, m.joint_force, m.reaction
+    steady, rising, still, wall = s.steady, s.rising, s.still, s.wall
+    mass, block = s.mass.vertex, s.mass.block
+    begin = s.mass.first[b]
+    count = s.mass.first[b + 1] - begin
+    slow = 1.0 - 0.5 * alpha * dt
+    fast = 1.0 / (1.0 + 0.5 * alpha * dt)
+    held = np.zeros((count, 2), dtype=np.bool_)
+    for k in range(row, last_row):
+        held[still[k, 0] - begin, still[k, 1]] = True
+    old = np.empty((count, 2))
+    kinetic, damped, load_work, wall_work, rise = 0.0, 0.0, 0.0, 0.0, 0.0
+    light, less = block[b, LIGHTER], block[b, LESS]
+    for d in range(2):
+        lift = ax if d == 0 else ay
+        tied, short = 0.0, 0.0
+        for j in range(count):
+            i = begin + j
+            old[j, d] = v[i, d]
+            total = zone[i, d] + joint[i, d] + steady[i, d] + load * rising[i, d]
+            if local > 0.0:
+                total = _resisted(total, old[j, d], local)
+            jump = total * dt / mass[i] + lift
+            if held[j, d]:
+                v[i, d] = old[j, d] + jump
+                tied += mass[i]
+                short += mass[i] * (wall[i, d] * speed - v[i, d])
+            else:
+                v[i, d] = old[j, d] * slow + jump
+        shift = light * short / (1.0 + light * tied)
+        sum_new, sum_drag, sum_mean = 0.0, 0.0, 0.0
+        for j in range(count):
+            i = begin + j
+            drag = 0.0
+            if held[j, d]:
+                new = wall[i, d] * speed
+                # A wall also carries the inertia of what it moves.
+                reaction[i, d] = mass[i] * (new - v[i, d] - shift) / dt
+                wall_work += reaction[i, d] * 0.5 * (old[j, d] + new)
+            else:
+                new = (v[i, d] + shift) * fast
+                drag = 0.5 * (old[j, d] + new)
+            mean = 0.5 * (old[j, d] + new)
+            applied = steady[i, d] + load * rising[i, d]
+            if local > 0.0:
+                total = zone[i, d] + joint[i, d] + applied
+                damped += (total - _resisted(total, old[j, d], local)) * mean
+            sum_new += mass[i] * new
+            sum_drag += mass[i] * drag
+            sum_mean += mass[i] * mean
+            kinetic += 0.5 * mass[i] * new * new
+            damped += alpha * mass[i] * drag * mean
+            load_work += applied * mean
+            rise += rising[i, d] * new
+            v[i, d] = new
+            x[i, d] += dt * new
+        kinetic -= 0.5 * less * sum_new * sum_new
+        damped -= alpha * less * sum_drag * sum_mean
+    return kinetic, damped, load_work, wall_work, rise
 
 
 @kernel(error_model="numpy")
@@ -124,13 +227,14 @@ def _move_plastic(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):
 def _move_rigid(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):
     begin, stop = parts.block[p], parts.block[p + 1]
     still, still_end = s.still_start[p], s.still_start[p + 1]
-    kinetic, damped, load_work, wall_work = move_rigid_blocks(
+    kinetic, damped, load_work, wall_work, rise = move_rigid_blocks(
         zones, begin, stop, still, still_end, s, m, load, alpha, local, dt, speed
     )
     sums[p, AT_KINETIC] = kinetic
     sums[p, AT_DAMPED] = damped
     sums[p, AT_LOAD] = load_work
     sums[p, AT_WALL] = wall_work
+    sums[p, AT_RISE] = rise
 
 
 _LAWS = {ElasticZones: _move_elastic, PlasticZones: _move_plastic, RigidBlocks: _move_rigid}

@@ -10,21 +10,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from graben.mechanics.blocks.contact.forces import Rows
+from graben.mechanics.blocks.engine.masses import Masses
 
 # Slots of Motion.drive: the coefficient of global damping [1/s]; what the rising load and the prescribed speeds are
-# multiplied by, and how much that grows a step (speeds: up to 1).
-DAMPING, LOAD, LOAD_STEP, SPEED, SPEED_STEP, DRIVE_SLOTS = 0, 1, 2, 3, 4, 5
+# multiplied by, and how much that grows a step (speeds: up to 1); by how much the load falls per unit of its way.
+DAMPING, LOAD, LOAD_STEP, SPEED, SPEED_STEP, BRAKE, DRIVE_SLOTS = 0, 1, 2, 3, 4, 5, 6
 # Slots of Motion.ledger: kinetic energy, energy taken by damping, by friction and by yielding, work of loads and of
-# walls [J/m]; largest overlap [m]; rates of kinetic energy and of damping as adaptive damping saw them.
+# walls [J/m]; largest overlap [m]; rates of kinetic energy and of damping as adaptive damping saw them;
+# way of the rising load, its work per unit of it [J/m].
 KINETIC, DAMPED, FRICTION, PLASTIC, LOAD_WORK, WALL_WORK, LARGEST_OVERLAP = 0, 1, 2, 3, 4, 5, 6
-RATE_SEEN, DAMPED_SEEN, LEDGER_SLOTS = 7, 8, 9
+RATE_SEEN, DAMPED_SEEN, WAY, LEDGER_SLOTS = 7, 8, 9, 10
 
 
 class Skeleton(NamedTuple):
     """What does not change while stepping: zones, contact nodes, masses, constraints and loads.
 
     zones : ElasticZones, or another law of zones/; first, second, weight, follow : contact nodes
-    mass : (vertices,) [kg/m]; still : (k, 2) vertex and axis of prescribed velocities, wall : (vertices, 2) [m/s];
+    mass : see masses.py; still : (k, 2) vertex and axis of prescribed velocities, wall : (vertices, 2) [m/s];
     still_start : (parts + 1,) where those of each part begin
     steady, rising : (vertices, 2) forces [N/m]; the load is steady + drive[LOAD] * rising, the velocity of
     still vertices drive[SPEED] * wall
@@ -35,7 +37,7 @@ class Skeleton(NamedTuple):
     second: np.ndarray
     weight: np.ndarray
     follow: np.ndarray
-    mass: np.ndarray
+    mass: Masses
     still: np.ndarray
     still_start: np.ndarray
     wall: np.ndarray

@@ -15,10 +15,12 @@ from graben.mechanics.blocks.engine.motion import (
     AT_LOAD,
     AT_OVERLAP,
     AT_PLASTIC,
+    AT_RISE,
     AT_WALL,
     move_blocks,
 )
 from graben.mechanics.blocks.engine.records import (
+    BRAKE,
     DAMPED,
     DAMPED_SEEN,
     DAMPING,
@@ -33,6 +35,7 @@ from graben.mechanics.blocks.engine.records import (
     SPEED,
     SPEED_STEP,
     WALL_WORK,
+    WAY,
 )
 from graben.mechanics.blocks.engine.threads import all_there, arrive
 from graben.mechanics.compiled import kernel
@@ -125,6 +128,7 @@ def _gather(m, sums, damping_ratio, damping_limit, alpha, dt):
     damped = 0.0
     load_work = 0.0
     wall_work = 0.0
+    rise = 0.0
     largest = 0.0
     for p in range(sums.shape[0]):
         m.ledger[FRICTION] += sums[p, AT_FRICTION]
@@ -134,6 +138,7 @@ def _gather(m, sums, damping_ratio, damping_limit, alpha, dt):
         damped += sums[p, AT_DAMPED]
         load_work += sums[p, AT_LOAD]
         wall_work += sums[p, AT_WALL]
+        rise += sums[p, AT_RISE]
     m.ledger[LARGEST_OVERLAP] = largest
     t = m.ledger
     if damping_ratio >= 0.0:
@@ -148,6 +153,9 @@ def _gather(m, sums, damping_ratio, damping_limit, alpha, dt):
     t[DAMPED] += damped * dt
     t[LOAD_WORK] += load_work * dt
     t[WALL_WORK] += wall_work * dt
+    t[WAY] += rise * dt
+    # A spring between the loaded ground and a frame that moves evenly. It answers at once, so it cannot feed swings.
+    m.drive[LOAD] -= m.drive[BRAKE] * rise * dt
     return kinetic
 
 

@@ -12,16 +12,14 @@ from graben.mechanics.blocks.contact.joints import RIM_SHARE, Joint
 from graben.mechanics.blocks.contact.nodes import COLUMNS, RIM
 from graben.mechanics.blocks.contact.search import no_pairs
 from graben.mechanics.blocks.contact.sleeping import fresh_sleep
+from graben.mechanics.blocks.engine import masses
 from graben.mechanics.blocks.engine.records import DRIVE_SLOTS, LEDGER_SLOTS, Motion, Skeleton
 from graben.mechanics.blocks.shape.bodies import Bodies, Skin
 from graben.mechanics.blocks.shape.partition import Parts, runs
-from graben.mechanics.blocks.zones.elastic import ElasticZones, lame, shape_gradients, stiffness_row_sums
+from graben.mechanics.blocks.zones.elastic import ElasticZones, lame, shape_gradients, stiffness_matrices
 from graben.mechanics.blocks.zones.plastic import PlasticZones, Strength, plastic_zones
 from graben.mechanics.blocks.zones.rigid import RigidBlocks, rigid_blocks, stiffest_motion
 from graben.mechanics.cache_lines import aligned
-
-# Time step over the estimate 2 / omega of the stiffest vertex (row sums bound omega from above).
-SAFETY = 0.9
 
 
 class Rock(NamedTuple):
@@ -37,11 +35,11 @@ class Rock(NamedTuple):
 
 
 class Made(NamedTuple):
-    """zones : their law; area : (zones,) [m2]; mass, true_mass : (vertices,) [kg/m]; dt [s]"""
+    """zones : their law; area : (zones,) [m2]; mass : of blocks; true_mass : (vertices,) [kg/m]; dt [s]"""
 
     zones: ElasticZones | PlasticZones | RigidBlocks
     area: np.ndarray
-    mass: np.ndarray
+    mass: masses.Masses
     true_mass: np.ndarray
     dt: float
 
@@ -56,42 +54,43 @@ def refuse_unsound(rock: Rock, joints: Sequence[Joint]) -> None:
         raise Refused(f"poisson must lie between -1 and 0.5, found {rock.poisson}")
 
 
-def zones_and_masses(bodies: Bodies, rock: Rock, joints: Sequence[Joint], dt: float | None) -> Made:
-    """Zones, and masses that make the time step stable; dt None: true masses, and dt from the estimate."""
+def zones_and_masses(
+    bodies: Bodies, rock: Rock, joints: Sequence[Joint], dt: float | None, local: float = 0.0
+) -> Made:
+    """Zones, and masses that make the time step stable; dt None: true masses, and dt from the estimate.
+
+    local : share of local damping, which makes the estimate shorter
+    """
     gradient, area = shape_gradients(bodies.position, bodies.zone_vertex)
     lam, mu = (np.full(len(area), c) for c in lame(rock.young, rock.poisson))
     thirds = np.repeat(rock.density * area / 3.0, 3)
     true_mass = np.bincount(bodies.zone_vertex.ravel(), weights=thirds, minlength=len(bodies.position))
-    elastic = ElasticZones(bodies.zone_vertex.astype(np.int32), gradient, area, lam, mu)
-    law: ElasticZones | PlasticZones | RigidBlocks = elastic
     stiffest = max(max(j.stiffest, j.shear_stiffness) for j in joints)
     if rock.rigid:
-        law = rigid_blocks(bodies, rock.density, area, runs(bodies.vertex_block)[1])
-        owner = np.repeat(np.arange(len(law.place)), np.diff(law.first))
-        stiffness = true_mass * (stiffest_motion(bodies, law, stiffest) / law.inertia[:, 0])[owner]
-    else:
-        stiffness = _vertex_stiffness(bodies, stiffest, stiffness_row_sums(gradient, area, lam, mu))
-    if rock.strength is not None and not rock.rigid:
+        return _rigid(bodies, rock.density, area, true_mass, stiffest, dt)
+    elastic = ElasticZones(bodies.zone_vertex.astype(np.int32), gradient, area, lam, mu)
+    law: ElasticZones | PlasticZones = elastic
+    if rock.strength is not None:
         law = plastic_zones(elastic, rock.young, rock.poisson, rock.strength)
+    zone = stiffness_matrices(gradient, area, lam, mu)
     if dt is None:
-        step = float(SAFETY * np.sqrt(4.0 * true_mass / stiffness).min())
-        return Made(law, area, true_mass.copy(), true_mass, step)
-    mass = stiffness * dt**2 / (4.0 * SAFETY**2)
-    if isinstance(law, RigidBlocks):
-        law.inertia[:, 0] *= (mass / true_mass)[law.first[:-1]]
+        mass, dt = masses.true_masses(bodies, zone, stiffest, rock.density)
+        return Made(law, area, mass, true_mass, float(dt / np.sqrt(1.0 + local)))
+    return Made(law, area, masses.scaled_masses(bodies, zone, stiffest, dt), true_mass, float(dt))
+
+
+def _rigid(
+    bodies: Bodies, density: float, area: np.ndarray, true_mass: np.ndarray, stiffest: float, dt: float | None
+) -> Made:
+    law = rigid_blocks(bodies, density, area, runs(bodies.vertex_block)[1])
+    owner = np.repeat(np.arange(len(law.place)), np.diff(law.first))
+    stiffness = stiffest_motion(bodies, law, stiffest)
+    if dt is None:
+        dt = float(masses.SAFETY * np.sqrt(4.0 * law.inertia[:, 0] / stiffness).min())
+    else:
+        law.inertia[:, 0] = stiffness * dt**2 / (4.0 * masses.SAFETY**2)
+    mass = masses.of_rigid(law.inertia[:, 0], law.share * law.inertia[owner, 0], law.first)
     return Made(law, area, mass, true_mass, float(dt))
-
-
-def _vertex_stiffness(bodies: Bodies, stiffest: float, rows: np.ndarray) -> np.ndarray:
-    """Bound on the stiffness that a vertex sees, from zones and from the joints along its edges [N/m per m]."""
-    total = np.bincount(bodies.zone_vertex.ravel(), weights=rows.ravel())
-    length = np.linalg.norm(bodies.position[bodies.edge_to] - bodies.position[bodies.edge_from], axis=1)
-    # An edge holds half its length at each end, against another block: twice in a row sum. Sliding blocks
-    # can face two others, so the half counts in full.
-    k = 2.0 * stiffest
-    np.add.at(total, bodies.edge_from, k * length)
-    np.add.at(total, bodies.edge_to, k * length)
-    return total
 
 
 def sets_of_edges(

@@ -6,6 +6,7 @@ import numpy as np
 
 from graben.mechanics.blocks.contact.joints import Joint, Pairs, contact_state
 from graben.mechanics.blocks.contact.nodes import node_motion, scatter_nodes
+from graben.mechanics.blocks.engine import masses
 from graben.mechanics.blocks.engine.records import (
     DAMPED,
     DAMPING,
@@ -16,6 +17,7 @@ from graben.mechanics.blocks.engine.records import (
     LOAD_WORK,
     PLASTIC,
     WALL_WORK,
+    WAY,
     Motion,
     Skeleton,
 )
@@ -51,6 +53,11 @@ class ModelState:
     def load_factor(self) -> float:
         """What the rising load is multiplied by now."""
         return float(self.motion.drive[LOAD])
+
+    @property
+    def way(self) -> float:
+        """Work of the rising load per unit of it [J/m], since the ledger began."""
+        return float(self.motion.ledger[WAY])
 
     @property
     def damping_coefficient(self) -> float:
@@ -146,7 +153,8 @@ class ModelState:
         z = self.skeleton.zones
         if isinstance(z, RigidBlocks):
             return float(kinetic_energies(z)[there[z.first[:-1]]].sum())
-        return float(0.5 * (self.skeleton.mass[there, None] * self.motion.v[there] ** 2).sum())
+        v = np.where(there[:, None], self.motion.v, 0.0)
+        return float(masses.kinetic_energies(self.skeleton.mass, self.motion.x, v).sum())
 
     def energies(self) -> dict[str, float]:
         """Energy ledger [J per m of thickness]; error = work put in - everything accounted for."""

@@ -43,20 +43,19 @@ def lame(young: float, poisson: float) -> tuple[float, float]:
     return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 * (1 + poisson))
 
 
-def stiffness_row_sums(gradient: np.ndarray, area: np.ndarray, lam: np.ndarray, mu: np.ndarray) -> np.ndarray:
-    """Largest absolute row sum (zones, 3) of each zone's stiffness matrix, per corner [N/m per m]."""
+def stiffness_matrices(gradient: np.ndarray, area: np.ndarray, lam: np.ndarray, mu: np.ndarray) -> np.ndarray:
+    """Stiffness (zones, 6, 6) of each zone at rest [N/m per m]; rows are x, y of the three corners in turn."""
     g = gradient
-    rows = np.zeros((len(area), 3, 2))
-    for i in range(3):
-        for j in range(3):
-            dot = g[:, i, 0] * g[:, j, 0] + g[:, i, 1] * g[:, j, 1]
-            for a in range(2):
-                for b in range(2):
-                    k = lam * g[:, i, a] * g[:, j, b] + mu * g[:, i, b] * g[:, j, a]
-                    if a == b:
-                        k = k + mu * dot
-                    rows[:, i, a] += np.abs(k) * area
-    return rows.max(axis=2)
+    k = np.einsum("z,zia,zjb->ziajb", lam * area, g, g) + np.einsum("z,zib,zja->ziajb", mu * area, g, g)
+    dot = np.einsum("z,zid,zjd->zij", mu * area, g, g)
+    for a in range(2):
+        k[:, :, a, :, a] += dot
+    return k.reshape(len(area), 6, 6)
+
+
+def row_sums(stiffness: np.ndarray) -> np.ndarray:
+    """Largest absolute row sum (zones, 3) of each zone's stiffness, per corner [N/m per m]."""
+    return np.abs(stiffness).sum(axis=2).reshape(-1, 3, 2).max(axis=2)
 
 
 @kernel(error_model="numpy")

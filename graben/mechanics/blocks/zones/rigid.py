@@ -203,7 +203,8 @@ def _constrain(blocks, b, begin, end, s, m, speed, dt, old, force, new, mean, pu
 
 @kernel(error_model="numpy")
 def move_rigid_blocks(blocks, begin, stop, still, still_end, s, m, load, alpha, local, dt, speed):
-    """New velocities and places of blocks begin to stop; returns kinetic energy, and powers of damping, loads, walls.
+    """New velocities and places of blocks begin to stop; returns kinetic energy, and powers of damping, loads, walls
+    and of the rising load per unit of it.
 
     still to still_end : rows of s.still of these blocks. m.zone_force gets what holds each vertex in its block.
     """
@@ -214,7 +215,7 @@ def move_rigid_blocks(blocks, begin, stop, still, still_end, s, m, load, alpha, 
     fast = 1.0 / (1.0 + 0.5 * alpha * dt)
     old, new, mean, pull, force = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     applied, work = np.empty(3), np.empty((9, 3))
-    kinetic, damped, load_work, wall_work = 0.0, 0.0, 0.0, 0.0
+    kinetic, damped, load_work, wall_work, rise = 0.0, 0.0, 0.0, 0.0, 0.0
     for b in range(begin, stop):
         mass, gyration = inertia[b, _MASS], inertia[b, _GYRATION]
         cx, cy = place[b, _CX], place[b, _CY]
@@ -279,4 +280,5 @@ def move_rigid_blocks(blocks, begin, stop, still, still_end, s, m, load, alpha, 
             v[i, 1] = new[1] + 0.5 * spin * (ox + rx)
             x[i, 0] = place[b, _CX] + rx
             x[i, 1] = place[b, _CY] + ry
-    return kinetic, damped, load_work, wall_work
+            rise += rising[i, 0] * v[i, 0] + rising[i, 1] * v[i, 1]
+    return kinetic, damped, load_work, wall_work, rise

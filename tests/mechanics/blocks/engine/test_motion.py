@@ -196,7 +196,7 @@ def test_consolidation_that_cannot_end_says_so():
         dt=1e-2,
     )
     with pytest.raises(NumericsFailed, match="consolidation"):
-        consolidate(model, -0.5e6, -0.25e6, limit=250)
+        consolidate(model, -0.5e6, -0.25e6, tolerance=1e-12, limit=250)
 
 
 def test_loose_blocks_are_found_and_stopped():
