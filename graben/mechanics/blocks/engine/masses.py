@@ -102,6 +102,21 @@ def inertial_force(masses: Masses, x: np.ndarray, acceleration: np.ndarray) -> n
     return m[:, None] * (acceleration - off - spin[:, None] * np.column_stack([-r[:, 1], r[:, 0]]))
 
 
+def mobility(masses: Masses, x: np.ndarray, force: np.ndarray) -> float:
+    """f . M_eff^-1 f of forces (vertices, 2): what they accelerate along themselves [m/s2 N/m]."""
+    m, block, owner, count = masses.vertex, masses.block, masses.owner, len(masses.block)
+
+    def total(values: np.ndarray) -> np.ndarray:
+        return np.bincount(owner, values, count)
+
+    centre = np.column_stack([total(m * x[:, d]) / block[:, WHOLE] for d in (0, 1)])
+    r = x - centre[owner]
+    push = np.column_stack([total(force[:, d]) for d in (0, 1)])
+    moment = total(r[:, 0] * force[:, 1] - r[:, 1] * force[:, 0])
+    rigid = block[:, LIGHTER] * (push**2).sum(axis=1) + block[:, NIMBLER] * moment**2
+    return float(((force**2).sum(axis=1) / m).sum() + rigid.sum())
+
+
 def kinetic_energies(masses: Masses, x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Kinetic energy (blocks in order of storage,) [J/m]."""
     power = (v * inertial_force(masses, x, v)).sum(axis=1)

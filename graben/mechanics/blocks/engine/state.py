@@ -88,6 +88,30 @@ class ModelState:
         out = self.held | self.loose_blocks()[self.bodies.vertex_block, None]
         return np.where(out, 0.0, m.zone_force + m.joint_force + self.load())
 
+    def resistance(self, acceleration: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Forces (vertices, 2) that inertia and global damping take up; nothing at prescribed velocities."""
+        slowed = acceleration + self.damping_coefficient * velocity
+        return np.where(self.held, 0.0, masses.inertial_force(self.skeleton.mass, self.motion.x, slowed))
+
+    def mobility(self) -> float:
+        """What the rising load accelerates along itself, per unit of it [1/s2 per unit of way]."""
+        return masses.mobility(self.skeleton.mass, self.motion.x, np.where(self.held, 0.0, self.skeleton.rising))
+
+    def block_imbalance(self) -> np.ndarray:
+        """Resultant on each block (blocks,) over the sizes of the forces that bear on it; 1 in free fall.
+
+        Blocks with a prescribed velocity, and those taken out, count as balanced.
+        """
+        m, b, count = self.motion, self.bodies, len(self.bodies.block_area)
+        load = self.load()
+        force = m.joint_force + load
+        total = np.hypot(*(np.bincount(b.vertex_block, f, count) for f in force.T))
+        size = np.bincount(b.vertex_block, np.hypot(*m.joint_force.T), count)
+        size += np.hypot(*(np.bincount(b.vertex_block, f, count) for f in load.T))
+        still = np.bincount(b.vertex_block, self.held.any(axis=1), count) > 0
+        ratio = np.divide(total, size, out=np.zeros(count), where=size > 0.0)
+        return np.where(still | self.removed, 0.0, ratio)
+
     def contact_force(self) -> np.ndarray:
         """Forces (vertices, 2) of all contacts [N/m], from where the blocks are now."""
         s, nodal = self.skeleton, np.zeros((len(self.skeleton.first), 2))

@@ -46,6 +46,7 @@ def test_inertial_force_undoes_what_forces_do():
         assert matrix @ force[these].ravel() == pytest.approx(acceleration[these].ravel(), rel=1e-9, abs=1e-9)
     power = 0.5 * (force * acceleration).sum()
     assert masses.kinetic_energies(table, bodies.position, acceleration).sum() == pytest.approx(power)
+    assert masses.mobility(table, bodies.position, force) == pytest.approx(2.0 * power)
 
 
 @pytest.mark.parametrize("tied", [(), ((0, 1),), ((0, 0), (0, 1), (2, 1))])

@@ -1,0 +1,136 @@
+"""A load that rises until the body fails, as if a stiff frame held it: past the failure it falls with the body.
+
+A dead load runs away with what fails under it, and inertia then bears a part of it. Here the loaded ground may move no
+faster than it moves under an even rise. With s the load in seconds of even rise, P the power of a load that grows by
+one a second, and C the largest way per second so far (the secant compliance),
+
+    ds/dt = 1 + G (1 - P / C).
+
+While the body answers as it did, P = C and the load rises at its rate; where it softens, the load rises more slowly;
+where it fails, the load falls. Integrated over time the second part is a spring between the ground and a frame that
+moves evenly, G times as stiff as the body. The compiled loop applies it in every step, so it feeds no swings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from graben.mechanics.blocks.engine.model import BlockModel
+from graben.mechanics.blocks.loading.loads import Loads, settlement_of
+from graben.mechanics.blocks.loading.rest import imbalance
+
+# Share of the whole rise over which a load sets in, and after which its compliance is known.
+_SET_IN = 0.02
+
+# The frame adds at most this share to the squared frequency that the time step bears.
+_STABLE = 0.25
+
+
+@dataclass(frozen=True)
+class Control:
+    """frame : stiffness of the frame over that of the body
+
+    beyond : the test ends when the loaded ground has gone this much further than at the largest load, over its way there
+    patience : most steps, over those of an even rise
+    """
+
+    frame: float = 10.0
+    beyond: float = 1.0
+    patience: float = 8.0
+
+
+@dataclass
+class Rise:
+    """Where a rising load stands.
+
+    load_time : load, in seconds of even rise; since : load time at which rates of loads last changed
+    settlement : m, displacement along the loads, weighted by them; imbalance : as of `rest.imbalance`
+    way : work per unit of load since then [J s/m]; resisted : energy that inertia and damping took up [J/m]
+    compliance : largest way per second of rise; speed : way per second now, over it
+    largest, way_there : the largest load since then, and the way there; chunk_time : of the last chunk [s]
+    steps : taken; failed : whether the ground went on without more load
+    """
+
+    load_time: float = 0.0
+    since: float = 0.0
+    settlement: float = 0.0
+    imbalance: float = 0.0
+    way: float = 0.0
+    resisted: float = 0.0
+    compliance: float = 0.0
+    speed: float = 0.0
+    largest: float = 0.0
+    way_there: float = 0.0
+    chunk_time: float = 0.0
+    steps: int = 0
+    failed: bool = False
+
+    def begin(self, load_time: float) -> None:
+        """Rates change: what the body answered before says nothing of what it will."""
+        self.load_time = self.since = self.largest = load_time
+        self.way = self.way_there = self.compliance = self.speed = 0.0
+
+
+def raise_load(
+    model: BlockModel,
+    loads: Loads,
+    rise: Rise,
+    control: Control,
+    velocity: np.ndarray,
+    *,
+    end: float,
+    stop: float,
+    reference: np.ndarray,
+) -> np.ndarray:
+    """One chunk of steps, which brings `rise` up to date; returns the mean velocity (vertices, 2) in it [m/s].
+
+    velocity : that of the chunk before; end : load time at which the rise is complete [s]; stop : load time that the
+    chunk must not run past, nor does it run past points of courses; reference : positions settlement counts from
+    """
+    dt, point = model.dt, loads.next_point(rise.since)
+    left = max(1.0, np.rint((min(stop, point) - rise.load_time) / dt))
+    # Looks come close enough that the load changes by a thousandth between two of them.
+    chunk = int(min(left, np.clip(1e-3 * rise.load_time / dt, 5, 100)))
+    before, way = model.motion.x.copy(), model.way
+    model.raise_load(*_rate(model, rise, control, end))
+    model.advance(chunk)
+    model.raise_load(0.0)
+    seconds, gone = chunk * dt, model.way - way
+    mean = (model.motion.x - before) / seconds
+    # Velocities are means of chunks, so vibration drops out of the acceleration.
+    acceleration = (mean - velocity) / (0.5 * (seconds + (rise.chunk_time or seconds)))
+    rise.resisted += float((model.resistance(acceleration, mean) * mean).sum()) * seconds
+    rise.chunk_time, rise.steps = seconds, rise.steps + chunk
+    rise.way += gone
+    rise.load_time = rise.since + model.load_factor
+    rise.settlement = settlement_of(loads.direction, model.motion.x - reference)
+    rise.imbalance = imbalance(model)
+    if rise.load_time > point - 0.5 * dt:
+        loads.begin(model, point)
+        rise.begin(point)
+        return mean
+    on = rise.load_time - rise.since
+    if rise.load_time >= rise.largest:
+        rise.largest, rise.way_there = rise.load_time, rise.way
+    if on > _SET_IN * end:
+        rise.compliance = max(rise.compliance, rise.way / on)
+    if rise.compliance > 0.0:
+        rise.speed = gone / seconds / rise.compliance
+        went_on = rise.way > (1.0 + control.beyond) * rise.way_there
+        rise.failed = (went_on and rise.load_time < rise.largest) or on <= 0.0
+    return mean
+
+
+def _rate(model: BlockModel, rise: Rise, control: Control, end: float) -> tuple[float, float]:
+    """What the load grows by in a step, and by how much less per unit of its way."""
+    dt = model.dt
+    if rise.compliance <= 0.0:
+        # A load that sets in at once makes the body swing.
+        return dt * min(1.0, 0.02 + 2.0 * (rise.load_time - rise.since) / (_SET_IN * end)), 0.0
+    mobility = model.mobility()
+    frame = control.frame
+    if mobility > 0.0:
+        frame = min(frame, _STABLE * rise.compliance / (dt**2 * mobility))
+    return dt * (1.0 + frame), frame / rise.compliance
