@@ -111,8 +111,8 @@ STAGES: tuple[Stage, ...] = (
         _same("numerics.consolidation_tolerance", "1", "unbalanced force that ends consolidation", 1e-3),
         _same("numerics.force_check", "1", "misfit of forces kept by slower loading; none: steady speed", None),
         _same("tessellation.zone_edge", "m", "longest edge of zones; none: zones span the corners of blocks", None),
-        _same("programme.calm", "1", "unbalanced force below which loads rise", 5e-3),
-        _same("programme.patience", "1", "steps of waiting that mean failure", 8000),
+        _same("programme.frame", "1", "stiffness of the frame over that of the body: how far loads overshoot", 10.0),
+        _same("programme.beyond", "1", "way past the largest load, over the way there", 1.0),
     )),
     Stage("dem-run", "particles", "contacts_per_m2", (
         Knob("numerics.safety", "1", "time step over the critical one: the energy balance", 0.6, 0.4, 0.2),

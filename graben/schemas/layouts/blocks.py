@@ -147,6 +147,7 @@ LAYOUT = Layout(
         "look_load_time": _rising(_L, "s", "time for which pressures had risen, waiting not counted"),
         "look_settlement": _rising(_L, "m", "displacement along the rising pressures, mean over the loaded length"),
         "look_imbalance": _rising(_L, "1", "mean unbalanced force over mean zone force"),
+        "look_load_at_rest": _rising(_L, "s", "load time of the load in balance with the rock alone"),
         "surface_vertex": Variable(
             ("surface",), "1", "vertex of the outline", dtype="i4", optional=True, index_of="vertex"
         ),

@@ -266,7 +266,7 @@ class BlocksScene(Scene):
         if self.programme is not None and "loading" in self.model_fields_set:
             faults.append("either [loading] or [programme]")
         if self.programme is not None and self.numerics.force_check is not None:
-            faults.append("numerics.force_check with [loading] only (a programme waits by programme.calm)")
+            faults.append("numerics.force_check with [loading] only (a frame paces a programme)")
         if self.in_situ is not None and self.in_situ.k0 is not None and self.programme is None:
             faults.append("in_situ.k0 with a [programme], which has weight")
         if self.programme is None and d.outline is not None:

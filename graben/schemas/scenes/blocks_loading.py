@@ -188,21 +188,21 @@ class Programme(Model):
     )
     loads: list[Load] = key(_SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)", max_length=10_000)
     excavations: list[Excavation] = key([], "blocks taken out at a time (repeatable)", max_length=10_000)
-    end: Time = key("100 s", "time of rise after which the run ends without failure (waiting not counted)", gt=0)
+    end: Time = key("100 s", "time of even rise after which the run ends without failure", gt=0)
     save_every: Time = key("4 s", "time of rise between saved states", gt=0)
-    calm: Number = _knob(
-        "programme.calm",
-        "loads rise while the mean unbalanced force over the mean zone force is below this, else they wait",
-        ge=1e-12,
-        le=1,
+    frame: Number = _knob(
+        "programme.frame",
+        "stiffness of the frame that holds the loads, over that of the body: past the failure they fall with it",
+        ge=0.1,
+        le=1e3,
     )
-    patience: Integer = _knob(
-        "programme.patience",
-        "steps of waiting after which the rock has failed, if the loaded ground still sinks faster than at first; "
-        "four times as many if it does not",
-        ge=1000,
-        le=10**12,
+    beyond: Number = _knob(
+        "programme.beyond",
+        "the test ends when the loaded ground has gone so much further than at the largest load, over its way there",
+        ge=0.01,
+        le=100,
     )
+    falling: Switch = key(False, "blocks may fall: the run goes on, and does not count it as failure")
 
     @model_validator(mode="after")
     def _something_holds(self) -> Programme:

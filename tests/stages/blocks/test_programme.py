@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray
 
-from graben.errors import BadInput, NumericsFailed
+from graben.errors import BadInput
 from graben.schemas.artifact import check_artifact, read_artifact
 from graben.stages.dem_run import stage as dem_run
 from graben.stages.tools import picture
@@ -22,7 +22,6 @@ steps = 10000
 vtk = false
 [programme]
 save_every = "8 s"
-patience = 4000
 [[programme.supports]]
 start = ["0 m","0 m"]
 end = ["0 m","2 m"]
@@ -66,9 +65,12 @@ def test_a_loaded_slope_fails_after_it_stood(finished):
     output, headline = finished
     assert check_artifact(output) == []
     assert headline["failed"]
-    assert headline["failure_load_pa"] == headline["largest_load_pa"]
-    assert 1e6 < headline["failure_load_pa"] < 25e6
-    assert headline["settlement_rate_over_first"] > 1.0
+    assert (
+        1e6 < headline["failure_load_low_pa"] < headline["failure_load_pa"] < headline["failure_load_high_pa"] < 25e6
+    )
+    assert headline["failure_load_pa"] < headline["largest_load_pa"] < headline["failure_load_high_pa"]
+    assert headline["fallen_blocks"] == 0 and headline["true_time_s"] > 0.0
+    assert 0.0 < headline["failure_settlement_m"] <= headline["settlement_m"] * 1.5
     assert headline["energy_error"] < 0.05
     d = read_artifact(output, "blocks")
     # The base and the weight at the first state, then the load as well.
@@ -79,7 +81,10 @@ def test_a_loaded_slope_fails_after_it_stood(finished):
     assert abs(vertical[1] - weight) < 0.2 * load
     assert 0.0 < headline["inertia_over_load"] < 0.2
     assert d.load_time.values[0] == 0.0
-    assert (np.diff(d.look_load_time) >= 0.0).all()
+    # Past the failure the load falls with the ground, which goes on as far again; what is at rest is never more.
+    assert d.look_load_time.values[-1] < d.look_load_time.values.max()
+    assert d.look_settlement.values[-1] > 1.8 * headline["settlement_m"]
+    assert (d.look_load_at_rest <= d.look_load_time).all()
     surface = d.vertex_position.values[d.surface_vertex.values]
     assert surface[:, 1].max() == pytest.approx(5.0, abs=0.02)
     assert not np.any((surface[:, 1] < 1.9) & (surface[:, 0] > 0.1))
@@ -151,12 +156,11 @@ def test_restart_wants_a_checkpoint_of_this_scene(scene):
 
 
 def test_a_body_that_does_not_stand_is_a_failure_of_the_run(scene):
-    with pytest.raises(NumericsFailed):
-        dem_run.run(
-            scene,
-            scene.with_name("falls.nc"),
-            overrides=['joints.friction="0 deg"', 'joints.cohesion="0 Pa"', 'joints.dilation="0 deg"'],
-        )
+    slippery = ['joints.friction="0 deg"', 'joints.cohesion="0 Pa"', 'joints.dilation="0 deg"']
+    headline = dem_run.run(scene, scene.with_name("falls.nc"), overrides=slippery)
+    assert headline["failed"] and headline["failure_load_pa"] is None
+    assert headline["fallen_blocks"] > 0 and headline["first_fallen_step"] > 0
+    assert check_artifact(scene.with_name("falls.nc")) == []
 
 
 @pytest.mark.parametrize(

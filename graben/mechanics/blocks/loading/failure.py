@@ -1,8 +1,8 @@
 """The load that a body bears at rest, read from a test that went past it.
 
-A test of finite speed shows more: what moves has inertia and is damped. Both are known along the way, so their share
-of the load can be taken off. With P = dF/ds . v the power of the load per unit of it, and R the power that inertia and
-damping take up, the load in balance with the rock alone is s - R / P. R and P are averaged over a stretch of the way.
+A test of finite speed shows more: what moves has inertia and is damped. Both are known along the way, so their
+share of the load can be taken off. With P = dF/ds . v the power of the load per unit of it, and R the power that
+inertia and damping take up, the load in balance with the rock alone is s - R / P, both averaged over a stretch.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _REPEATS = 0.005
 
 
 class Failure(NamedTuple):
-    """In units of the load: what is borne at rest, an interval that holds it, and the index of the look it is read at.
+    """In units of the load: what is borne at rest, an interval that holds it, and the index of the look there.
 
     high is the largest load of the test; low lies as far below what is borne at rest as high lies above it.
     """

@@ -6,8 +6,8 @@ import numpy as np
 
 from graben.mechanics.blocks.engine.model import BlockModel
 
-# A block has fallen when it dropped by this share of its size since nothing bore it, or moved by its size in all while
-# the body should come to rest.
+# A block has fallen when it dropped by this share of its size since nothing bore it, or moved by its size in all
+# while the body should come to rest.
 _DROP = 0.1
 
 

@@ -1,8 +1,8 @@
 """A load that rises until the body fails, as if a stiff frame held it: past the failure it falls with the body.
 
-A dead load runs away with what fails under it, and inertia then bears a part of it. Here the loaded ground may move no
-faster than it moves under an even rise. With s the load in seconds of even rise, P the power of a load that grows by
-one a second, and C the largest way per second so far (the secant compliance),
+A dead load runs away with what fails under it, and inertia then bears a part of it. Here the loaded ground may move
+no faster than it moves under an even rise. With s the load in seconds of even rise, P the power of a load that grows
+by one a second, and C the largest way per second so far (the secant compliance),
 
     ds/dt = 1 + G (1 - P / C).
 
@@ -32,7 +32,7 @@ _STABLE = 0.25
 class Control:
     """frame : stiffness of the frame over that of the body
 
-    beyond : the test ends when the loaded ground has gone this much further than at the largest load, over its way there
+    beyond : the test ends when the ground has gone this much further than at the largest load, over its way there
     patience : most steps, over those of an even rise
     """
 

@@ -47,9 +47,8 @@ def dug():
         model.hold(base, axis)
     loads = Loads(len(base))
     loads.add(pressure_forces(model.bodies, SQUARE[2], SQUARE[3]), Course([(0.0, 1e5)], 1e5))
-    control = Control(calm=0.1, patience=1000)
     digs = [Dig(HOLE, 2.5, relax_over=3.0)]
-    return Programme(model, loads, control, end=8.0, save_every=2.0, tolerance=1e-2, digs=digs)
+    return Programme(model, loads, Control(), end=8.0, save_every=2.0, tolerance=1e-2, digs=digs)
 
 
 def kept(test):

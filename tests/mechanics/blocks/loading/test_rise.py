@@ -1,0 +1,107 @@
+"""Loads that rise to failure and fall with it: closed forms of bodies that topple, slide and fall."""
+
+import numpy as np
+import pytest
+
+from graben.mechanics.blocks.contact.joints import Joint
+from graben.mechanics.blocks.engine.model import BlockModel
+from graben.mechanics.blocks.loading.courses import Course
+from graben.mechanics.blocks.loading.failure import failure_of
+from graben.mechanics.blocks.loading.falling import Falling
+from graben.mechanics.blocks.loading.loads import Loads, on_segment, pressure_forces
+from graben.mechanics.blocks.loading.programme import Control, Programme
+from graben.mechanics.blocks.shape.bodies import build_bodies
+from graben.mechanics.blocks.shape.tessellation import from_polygons
+
+G, RHO = 9.81, 2500.0
+
+
+def rectangle(x0, y0, x1, y1):
+    return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
+
+
+def standing(shapes, outline, *, friction, end, steps, rounding=0.01, gravity=(0.0, -G), rigid=False):
+    bodies = build_bodies(from_polygons(shapes, outline))
+    joint = Joint(1e10, 5e9, np.tan(np.radians(friction)), 0.0, 0.0, 0.0, np.inf)
+    model = BlockModel(
+        bodies, young=20e9, poisson=0.2, density=RHO, joint=joint, rounding=rounding, dt=end / steps,
+        gravity=gravity, rigid=rigid,
+    )  # fmt: skip
+    low = outline[:, 1].min()
+    base = on_segment(bodies, np.array([outline[:, 0].min(), low]), np.array([outline[:, 0].max(), low]))
+    for axis in (0, 1):
+        model.hold(base, axis)
+    return model
+
+
+def failed(model, segment, course, end, control=None):
+    loads = Loads(len(model.bodies.position))
+    loads.add(pressure_forces(model.bodies, *segment), course)
+    test = Programme(model, loads, control or Control(), end=end, save_every=end, tolerance=1e-3)
+    for _ in test.begin():
+        pass
+    for _ in test.run():
+        pass
+    assert test.rise.failed
+    looks = np.array(test.looks)
+    return failure_of(looks[:, 0], looks[:, 3], looks[:, 4]), looks
+
+
+@pytest.mark.parametrize(("width", "frame"), [(1.0, 10.0), (0.8, 10.0), (1.0, 5.0)])
+def test_a_block_that_is_pushed_topples_about_its_corner(width, frame):
+    high, rounding, end = 2.0, 0.01, 50.0
+    shapes = [rectangle(0, -0.5, width, 0), rectangle(0, 0, width, high)]
+    model = standing(shapes, rectangle(0, -0.5, width, high), friction=40.0, end=end, steps=12_500)
+    exact = RHO * G * width * (width - 2 * rounding) / high
+    course = Course([(0.0, 0.0)], 2.0 * exact / end)
+    failure, looks = failed(model, ((0, 0), (0, high)), course, end, Control(frame=frame))
+    assert course.at(failure.load) == pytest.approx(exact, rel=0.01)
+    assert course.at(failure.low) < exact < course.at(failure.high)
+    assert looks[:, 0].max() < 1.02 * failure.load
+    # The load fell with the block, and the block did not run away.
+    assert looks[-1, 3] < 2.2 * looks[failure.look, 3]
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+def test_a_block_that_is_pushed_slides_at_its_friction(rigid):
+    end = 40.0
+    shapes = [rectangle(0, -0.5, 2, 0), rectangle(0, 0, 2, 1)]
+    model = standing(shapes, rectangle(0, -0.5, 2, 1), friction=20.0, end=end, steps=10_000, rigid=rigid)
+    exact = RHO * G * 2.0 * np.tan(np.radians(20.0))
+    course = Course([(0.0, 0.0)], 2.0 * exact / end)
+    failure, _ = failed(model, ((0, 0), (0, 1)), course, end)
+    assert course.at(failure.load) == pytest.approx(exact, rel=0.01)
+
+
+def test_a_support_pressure_that_is_lowered_lets_the_block_go():
+    # A block on a slippery slope of 45 deg, held back by a pressure on its lower side.
+    end = 40.0
+    base = np.array([(0, 0), (3, 0), (3, 3)], dtype=float)
+    block = np.array([(1, 1), (2, 2), (1.5, 2.5), (0.5, 1.5)], dtype=float)
+    outline = np.array([(0, 0), (3, 0), (3, 3), (2, 2), (1.5, 2.5), (0.5, 1.5), (1, 1)], dtype=float)
+    model = standing([base, block], outline, friction=20.0, end=end, steps=12_500, rounding=0.005)
+    slope, length = np.radians(45.0), 0.5 * np.sqrt(2.0)
+    weight = RHO * G * np.sqrt(2.0) * length
+    exact = weight * (np.sin(slope) - np.cos(slope) * np.tan(np.radians(20.0))) / length
+    course = Course([(0.0, 1.5 * exact), (end, 0.0)])
+    failure, _ = failed(model, ((0.5, 1.5), (1, 1)), course, end)
+    assert course.at(failure.load) == pytest.approx(exact, rel=0.01)
+
+
+def test_blocks_that_lose_their_support_have_fallen():
+    shapes = [rectangle(0, 0, 1, 1), rectangle(1.5, 3, 2.5, 4)]
+    model = standing(shapes, rectangle(0, 0, 2.5, 4), friction=30.0, end=10.0, steps=1000)
+    falling = Falling(model)
+    found = [falling.look(model)]
+    while not found[-1] and model.steps_done < 50_000:
+        model.advance(100)
+        found.append(falling.look(model))
+    assert falling.blocks.tolist() == [1] and falling.step[1] <= 100
+    dropped = model.motion.x[model.bodies.vertex_block == 1, 1].min()
+    assert dropped == pytest.approx(2.9, abs=0.05)
+    again = Falling(model)
+    again.bring_back(falling.state())
+    assert again.blocks.tolist() == [1] and not again.look(model)
+    weightless = standing(shapes, rectangle(0, 0, 2.5, 4), friction=30.0, end=10.0, steps=1000, gravity=(0.0, 0.0))
+    weightless.advance(500)
+    assert not Falling(weightless).look(weightless)
