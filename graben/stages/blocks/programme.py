@@ -12,14 +12,14 @@ from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading import programme as mechanics
 from graben.mechanics.blocks.loading.courses import Course
 from graben.mechanics.blocks.loading.excavation import Dig, blocks_in
-from graben.mechanics.blocks.loading.failure import failure_of, static_load
+from graben.mechanics.blocks.loading.failure import static_load
 from graben.mechanics.blocks.loading.loads import Loads, on_segment, pressure_forces, settlement_of
 from graben.mechanics.blocks.loading.rise import Control
 from graben.mechanics.blocks.record.history import History
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.schemas.scenes.blocks_loading import Load
 from graben.stages.blocks.report import energy_error, energy_measure, kinetic_measure, kinetic_share
-from graben.stages.shared.measures import Measure
+from graben.stages.shared.measures import Measure, number
 
 
 def programme(scene: BlocksScene, model: BlockModel) -> mechanics.Programme:
@@ -62,7 +62,14 @@ def programme(scene: BlocksScene, model: BlockModel) -> mechanics.Programme:
     )
 
 
-_FAILURE = ("failure_load_pa", "failure_load_low_pa", "failure_load_high_pa", "failure_settlement_m")
+_FAILURE = (
+    "failure_load_pa",
+    "failure_load_low_pa",
+    "failure_load_high_pa",
+    "failure_settlement_m",
+    "inertia_over_load",
+    "failure_load_width",
+)
 
 
 class ProgrammeReport:
@@ -77,7 +84,7 @@ class ProgrammeReport:
 
     def arrays(self, history: History) -> dict[str, np.ndarray]:
         """Arrays of the artifact that only this test has."""
-        looks = np.array(self.test.looks).reshape(-1, 5)
+        looks = self.test.look_table()
         surface = self._surface()
         return {
             "confining_stress": np.array(0.0),
@@ -110,20 +117,12 @@ class ProgrammeReport:
         rise, test = self.test.rise, self.test
         reference = arrays["vertex_position"]
         course = next((c for c in map(_course, self.programme.loads) if c.changes), Course([(0.0, 0.0)]))
-        looks = np.array(test.looks).reshape(-1, 5)[test.first_look :]
+        looks = test.look_table()
         farthest = float(looks[:, 0].max()) if len(looks) else 0.0
-        largest = max(
-            course.at(farthest), course.at(0.0), *(v for t, v in zip(course.times, course.values) if t <= farthest)
-        )
-        found: dict[str, Any] = dict.fromkeys(_FAILURE)
-        if rise.failed and course.changes and len(looks):
-            failure = failure_of(looks[:, 0], looks[:, 3], looks[:, 4])
-            loads = (course.at(t) for t in (failure.load, failure.low, failure.high))
-            found = dict(zip(_FAILURE, (*map(float, loads), float(looks[failure.look, 1])), strict=True))
-            inertia = 1.0 - failure.load / looks[failure.look, 0]
-            width = (failure.high - failure.low) / failure.load
-        else:
-            inertia = width = 0.0
+        passed = (v for t, v in zip(course.times, course.values, strict=True) if t <= farthest)
+        largest = max(course.at(farthest), course.at(0.0), *passed)
+        fallen = test.falling.blocks
+        first = fallen[np.argmin(test.falling.step[fallen])] if len(fallen) else None
         direction = self.test.loads.direction
         loaded = direction.any(axis=1)
         sunk = -(self.test.carried - reference)[loaded, 1] if loaded.any() else np.zeros(1)
@@ -131,30 +130,34 @@ class ProgrammeReport:
         return {
             "blocks": len(arrays["block_area"]),
             **({"blocks_removed": int(self.model.removed.sum())} if self.programme.excavations else {}),
-            **found,
-            "failure_load_width": width,
+            **self._failure(course),
             "failed": rise.failed,
-            "fallen_blocks": len(test.falling.blocks),
-            **(
-                {
-                    "first_fallen_block": int(test.falling.blocks[np.argmin(test.falling.step[test.falling.blocks])]),
-                    "first_fallen_step": int(test.falling.step[test.falling.blocks].min()),
-                }
-                if len(test.falling.blocks)
-                else {}
-            ),
-            "true_time_s": float((self.model.time) / np.sqrt(np.median(self.model.mass_ratio))),
+            "load_reached": test.reached,
+            "fallen_blocks": len(fallen),
+            "first_fallen_block": None if first is None else int(first),
+            "first_fallen_step": None if first is None else int(test.falling.step[first]),
+            "true_time_s": float(rise.steps * self.model.dt / np.sqrt(np.median(self.model.mass_ratio))),
             "largest_load_pa": float(largest),
             "settlement_m": float(mean),
             "settlement_min_m": float(sunk.min()),
             "settlement_max_m": float(sunk.max()),
             "settlement_rate_over_first": rise.speed,
-            "inertia_over_load": inertia,
             "imbalance": rise.imbalance,
             "steps": self.model.steps_done,
             "energy_error": energy_error(arrays),
             "kinetic_over_stored_energy": _mean(kinetic_share(arrays)[1:-1]),
         }
+
+    def _failure(self, course: Course) -> dict[str, float | None]:
+        """Failure load with its interval [Pa], settlement there [m], and the share of inertia and damping."""
+        found = self.test.failure() if course.changes else None
+        if found is None:
+            return dict.fromkeys(_FAILURE)
+        time, settlement = self.test.looks[found.look][:2]
+        load, there = course.at(found.load), course.at(time)
+        low, high = sorted((course.at(found.low), course.at(found.high)))
+        inertia, width = (number(v / abs(load)) if load else None for v in (abs(there - load), high - low))
+        return dict(zip(_FAILURE, (load, low, high, settlement, inertia, width), strict=True))
 
     def measures(self, headline: dict[str, Any]) -> list[Measure]:
         """Error measures with their thresholds."""
@@ -169,6 +172,12 @@ class ProgrammeReport:
             Measure(
                 "failure_load_width", headline["failure_load_width"], 0.1,
                 "the interval of the failure load is {percent} of it wide; take more steps (numerics.steps)",
+            ),
+            Measure(
+                "load_reached", None if headline["failed"] else headline["load_reached"], math.inf,
+                "the loads came to {percent} of their rise in eight times its steps: the body neither failed nor "
+                "bore them all; more steps (numerics.steps) may tell",
+                least=1.0 - 1e-6,
             ),
         ]  # fmt: skip
 

@@ -229,4 +229,5 @@ def test_the_state_at_the_end_is_saved_and_what_few_states_cannot_tell_is_nan(tm
         headline = dem_run.run(path, output, overrides=[f'programme.save_every="{every}"'])
         assert read_artifact(output, "blocks").load_time.values == pytest.approx(times, rel=0.2)
         assert bool(np.isfinite(headline["kinetic_over_stored_energy"])) == (len(times) > 2)
-        assert headline["failure_load_pa"] is None and headline["inertia_over_load"] == 0.0
+        assert headline["failure_load_pa"] is None and headline["inertia_over_load"] is None
+        assert headline["load_reached"] == pytest.approx(1.0, rel=1e-6)

@@ -17,9 +17,9 @@ from tests.conftest import command
 
 FAST = """
 kind = "blocks"
-domain = { width = "1.5 m", height = "1.5 m" }
-loading = { duration = "6 s", states = 4, confining_pressure = "0.7 MPa" }
-numerics.steps = 130
+domain = { width = "4 m", height = "4 m" }
+loading = { duration = "6 s", states = 4, confining_pressure = "0.1 MPa" }
+numerics.steps = 500
 output.vtk = false
 """
 
@@ -44,6 +44,7 @@ def test_a_test_that_is_too_fast_is_told_to_a_person(fast):
     _, result = fast
     assert result.exit_code == 0, result.output
     assert "warning: the lateral stress inside is" in result.stderr
+    assert "warning: kinetic energy is" in result.stderr
     assert "warnings" not in result.stdout
 
 

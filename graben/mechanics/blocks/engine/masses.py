@@ -8,7 +8,7 @@ split into its rigid part, with a mass and a moment of inertia of its own, and t
 
 with D the masses of the vertices, M and I their sum and moment of inertia, R and N the resultant of the forces f and
 its moment about their centre, M_r and I_r the block's own. This is selective mass scaling (Olovsson, Simonsson and
-Unosson 2005), block by block. `inertial_force` applies the inverse.
+Unosson 2005), block by block. `inertial_force` applies the inverse, by the formula of Sherman and Morrison.
 """
 
 from __future__ import annotations
@@ -18,18 +18,19 @@ from typing import NamedTuple
 import numpy as np
 
 from graben.mechanics.blocks.shape.bodies import Bodies
-from graben.mechanics.blocks.zones.elastic import row_sums
+from graben.mechanics.blocks.shape.partition import runs
+from graben.mechanics.blocks.zones.elastic import row_sums, shape_gradients
 from graben.mechanics.blocks.zones.rigid import rigid_blocks, stiffest_motion
 
 # Time step over the limit 2 / omega of the stiffest block.
 SAFETY = 0.9
 
-# Columns of Masses.block: M and I of the vertices; what the rigid part gains, 1/M_r - 1/M and 1/I_r - 1/I; and what
-# inertia leaves out of it, 1/M - M_r/M^2 and 1/I - I_r/I^2.
-WHOLE, TURN, LIGHTER, NIMBLER, LESS, LESS_TURN = range(6)
+# Columns of Masses.block: M of the vertices, and what the rigid part gains, 1/M_r - 1/M and 1/I_r - 1/I.
+WHOLE, LIGHTER, NIMBLER = range(3)
 
-# Vertices of a block whose stiffness is looked at as a whole; the row sums bound that of larger ones.
-_LARGEST = 64
+# Vertices of a block whose stiffness is looked at as a whole; the row sums bound that of larger ones. Entries of the
+# matrices of blocks that are looked at together: 32 MB each.
+_LARGEST, _TOGETHER = 64, 4_000_000
 
 # Joints count this much in the masses of the vertices, and 1 / (1 - 1/_SHARE) in those of the blocks: with both, the
 # step is stable for any motion made of a rigid part and a rest, (u + w)^2 <= u^2 / (1 - 1/_SHARE) + _SHARE w^2.
@@ -39,7 +40,7 @@ _SHARE = 4.0
 class Masses(NamedTuple):
     """vertex : (vertices,) [kg/m]; first : (blocks + 1,) first vertex of each block in order of storage
 
-    block : (blocks, 6) columns as above
+    block : (blocks, 3) columns as above
     """
 
     vertex: np.ndarray
@@ -62,10 +63,11 @@ class Masses(NamedTuple):
         It looks at the force on each vertex, so zones in balance would push a whole block. Where velocities turn it
         adds to the force, as stiffer springs would; scaled masses follow.
         """
+        heavier = 1.0 + local if scaled else 1.0
         block = self.block.copy()
         block[:, LIGHTER:] = 0.0
-        block[:, :LIGHTER] *= 1.0 + local if scaled else 1.0
-        return self._replace(block=block, vertex=self.vertex * (1.0 + local if scaled else 1.0))
+        block[:, WHOLE] *= heavier
+        return self._replace(block=block, vertex=self.vertex * heavier)
 
     def held(self, vertices: np.ndarray) -> Masses:
         """The same, where blocks of these held vertices (indices) turn with the inertia of their vertices.
@@ -73,48 +75,47 @@ class Masses(NamedTuple):
         A held vertex then couples to the others through the sum of forces alone, which has a closed form.
         """
         block = self.block.copy()
-        block[np.unique(self.owner[vertices])[:, None], [NIMBLER, LESS_TURN]] = 0.0
+        block[np.unique(self.owner[vertices]), NIMBLER] = 0.0
         return self._replace(block=block)
 
 
 def of_rigid(block: np.ndarray, vertex: np.ndarray, first: np.ndarray) -> Masses:
     """Shares (vertices,) of the masses (blocks,) of rigid blocks, which move by laws of their own."""
-    table = np.zeros((len(block), 6))
+    table = np.zeros((len(block), 3))
     table[:, WHOLE] = block
-    table[:, TURN] = 1.0
     return Masses(vertex, first, table)
+
+
+def _resultants(masses: Masses, x: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Arms (vertices, 2) from the centres of the blocks at x; resultants (blocks, 2) of forces, and moments."""
+    owner, count = masses.owner, len(masses.block)
+    whole = np.column_stack([np.bincount(owner, masses.vertex * x[:, d], count) for d in (0, 1)])
+    arm = x - (whole / masses.block[:, WHOLE, None])[owner]
+    push = np.column_stack([np.bincount(owner, force[:, d], count) for d in (0, 1)])
+    return arm, push, np.bincount(owner, arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0], count)
 
 
 def inertial_force(masses: Masses, x: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
     """Forces (vertices, 2) that an acceleration (vertices, 2) takes at positions x: M_eff a."""
-    m, block, owner, count = masses.vertex, masses.block, masses.owner, len(masses.block)
-    whole = block[:, WHOLE]
+    m, block, owner = masses.vertex[:, None], masses.block, masses.owner
+    arm, push, moment = _resultants(masses, x, m * acceleration)
+    turn = np.bincount(owner, masses.vertex * (arm**2).sum(axis=1), len(block))
+    off = (_left_out(block[:, LIGHTER], block[:, WHOLE])[:, None] * push)[owner]
+    spin = (_left_out(block[:, NIMBLER], turn) * moment)[owner]
+    return m * (acceleration - off - spin[:, None] * np.column_stack([-arm[:, 1], arm[:, 0]]))
 
-    def total(values: np.ndarray) -> np.ndarray:
-        return np.bincount(owner, values, count)
 
-    centre = np.column_stack([total(m * x[:, d]) / whole for d in (0, 1)])
-    push = np.column_stack([total(m * acceleration[:, d]) for d in (0, 1)])
-    r = x - centre[owner]
-    moment = total(m * (r[:, 0] * acceleration[:, 1] - r[:, 1] * acceleration[:, 0]))
-    off = (block[:, LESS, None] * push)[owner]
-    spin = (block[:, LESS_TURN] * moment)[owner]
-    return m[:, None] * (acceleration - off - spin[:, None] * np.column_stack([-r[:, 1], r[:, 0]]))
+def _left_out(gain: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+    """What inertia leaves out of a rigid motion with a gain 1/M_r - 1/M: 1/M - M_r/M^2."""
+    return gain / (1.0 + gain * inertia)
 
 
 def mobility(masses: Masses, x: np.ndarray, force: np.ndarray) -> float:
     """f . M_eff^-1 f of forces (vertices, 2): what they accelerate along themselves [m/s2 N/m]."""
-    m, block, owner, count = masses.vertex, masses.block, masses.owner, len(masses.block)
-
-    def total(values: np.ndarray) -> np.ndarray:
-        return np.bincount(owner, values, count)
-
-    centre = np.column_stack([total(m * x[:, d]) / block[:, WHOLE] for d in (0, 1)])
-    r = x - centre[owner]
-    push = np.column_stack([total(force[:, d]) for d in (0, 1)])
-    moment = total(r[:, 0] * force[:, 1] - r[:, 1] * force[:, 0])
+    block = masses.block
+    _, push, moment = _resultants(masses, x, force)
     rigid = block[:, LIGHTER] * (push**2).sum(axis=1) + block[:, NIMBLER] * moment**2
-    return float(((force**2).sum(axis=1) / m).sum() + rigid.sum())
+    return float(((force**2).sum(axis=1) / masses.vertex).sum() + rigid.sum())
 
 
 def kinetic_energies(masses: Masses, x: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -133,38 +134,31 @@ def scaled_masses(bodies: Bodies, zone: np.ndarray, joint: float, dt: float) -> 
     """
     springs = _springs(bodies, joint)
     vertex = np.bincount(bodies.zone_vertex.ravel(), row_sums(zone).ravel(), len(springs)) + _SHARE * springs
-    r = rigid_blocks(bodies, 1.0, _areas(bodies), _first(bodies))
+    first = runs(bodies.vertex_block)[1].astype(np.int64)
+    r = rigid_blocks(bodies, 1.0, shape_gradients(bodies.position, bodies.zone_vertex)[1], first)
     rigid = stiffest_motion(bodies, r, joint) / (1.0 - 1.0 / _SHARE)
-    # Stiffness over mass of what was chosen is below one: bounds are coarse. What it is block by block scales masses.
-    chosen = _masses(bodies, vertex, rigid, rigid * r.inertia[:, 1] ** 2)
+    spin = rigid * r.inertia[:, 1] ** 2
+    # Bounds are coarse: the largest stiffness over mass of each block is below one, and scales its masses.
+    chosen = _masses(bodies, first, vertex, rigid, spin)
     scale = _largest(bodies, chosen, zone, springs) * (dt / (2.0 * SAFETY)) ** 2
-    return _masses(bodies, vertex * scale[chosen.owner], rigid * scale, rigid * r.inertia[:, 1] ** 2 * scale)
+    return _masses(bodies, first, vertex * scale[chosen.owner], rigid * scale, spin * scale)
 
 
 def true_masses(bodies: Bodies, zone: np.ndarray, joint: float, density: float) -> tuple[Masses, float]:
     """Masses as they are, blocks with the moment of inertia of their area; and the largest stable step [s]."""
-    area = _areas(bodies)
+    area, first = (
+        shape_gradients(bodies.position, bodies.zone_vertex)[1],
+        runs(bodies.vertex_block)[1].astype(np.int64),
+    )
     third = np.bincount(bodies.zone_vertex.ravel(), np.repeat(density * area / 3.0, 3), len(bodies.position))
-    r = rigid_blocks(bodies, density, area, _first(bodies))
+    r = rigid_blocks(bodies, density, area, first)
     inertia = r.inertia[:, 0] * r.inertia[:, 1] ** 2
-    large = np.diff(_first(bodies)) > _LARGEST
-    masses = _masses(bodies, third, r.inertia[:, 0], np.where(large, np.inf, inertia))
+    large = np.diff(first) > _LARGEST
+    masses = _masses(bodies, first, third, r.inertia[:, 0], np.where(large, np.inf, inertia))
     springs = _springs(bodies, joint)
-    omega2 = _largest(bodies, masses, zone, springs)
     bound = (np.bincount(bodies.zone_vertex.ravel(), row_sums(zone).ravel(), len(springs)) + 2.0 * springs) / third
-    omega2 = np.where(large, np.maximum.reduceat(bound, _first(bodies)[:-1]), omega2)
+    omega2 = np.where(large, np.maximum.reduceat(bound, first[:-1]), _largest(bodies, masses, zone, springs))
     return masses, float(2.0 * SAFETY / np.sqrt(omega2.max()))
-
-
-def _first(bodies: Bodies) -> np.ndarray:
-    block = bodies.vertex_block
-    return np.append(np.flatnonzero(np.append(True, block[1:] != block[:-1])), len(block)).astype(np.int64)
-
-
-def _areas(bodies: Bodies) -> np.ndarray:
-    p = bodies.position[bodies.zone_vertex]
-    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    return 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
 def _springs(bodies: Bodies, joint: float) -> np.ndarray:
@@ -180,26 +174,15 @@ def _springs(bodies: Bodies, joint: float) -> np.ndarray:
     return springs
 
 
-def _masses(bodies: Bodies, vertex: np.ndarray, rigid: np.ndarray, spin: np.ndarray) -> Masses:
+def _masses(bodies: Bodies, first: np.ndarray, vertex: np.ndarray, rigid: np.ndarray, spin: np.ndarray) -> Masses:
     """Masses of vertices and of blocks (in order of storage); a rigid part is never heavier than its vertices."""
-    first = _first(bodies)
-    count = len(first) - 1
-    owner = np.repeat(np.arange(count), np.diff(first))
-    whole = np.bincount(owner, vertex, count)
-    centre = np.column_stack([np.bincount(owner, vertex * bodies.position[:, d], count) / whole for d in (0, 1)])
-    turn = np.bincount(owner, vertex * ((bodies.position - centre[owner]) ** 2).sum(axis=1), count)
-    rigid, spin = np.minimum(rigid, whole), np.minimum(spin, turn)
-    block = np.column_stack(
-        [
-            whole,
-            turn,
-            1.0 / rigid - 1.0 / whole,
-            1.0 / spin - 1.0 / turn,
-            (1.0 - rigid / whole) / whole,
-            (1.0 - spin / turn) / turn,
-        ]
-    )
-    return Masses(vertex, first, np.ascontiguousarray(block))
+    whole = np.add.reduceat(vertex, first[:-1])
+    plain = Masses(vertex, first, np.column_stack([whole, np.zeros((len(whole), 2))]))
+    arm = _resultants(plain, bodies.position, np.zeros_like(bodies.position))[0]
+    turn = np.add.reduceat(vertex * (arm**2).sum(axis=1), first[:-1])
+    lighter = 1.0 / np.minimum(rigid, whole) - 1.0 / whole
+    nimbler = 1.0 / np.minimum(spin, turn) - 1.0 / turn
+    return plain._replace(block=np.column_stack([whole, lighter, nimbler]))
 
 
 def _largest(bodies: Bodies, masses: Masses, zone: np.ndarray, springs: np.ndarray) -> np.ndarray:
@@ -207,32 +190,39 @@ def _largest(bodies: Bodies, masses: Masses, zone: np.ndarray, springs: np.ndarr
 
     The largest of all bounds the squared frequency of the whole, because springs between blocks count twice.
     """
-    owner, first, x = masses.owner, masses.first, bodies.position
-    size = np.diff(first)
-    zone_owner = owner[bodies.zone_vertex[:, 0]]
+    size = np.diff(masses.first)
     result = np.ones(len(size))
     for n in np.unique(size[size <= _LARGEST]):
-        these = np.flatnonzero(size == n)
-        place = np.full(len(size), -1)
-        place[these] = np.arange(len(these))
-        k = np.zeros((len(these), 2 * n, 2 * n))
-        mine = np.flatnonzero(place[zone_owner] >= 0)
-        corner = bodies.zone_vertex[mine] - first[zone_owner[mine], None]
-        dof = (2 * corner[:, :, None] + np.arange(2)).reshape(len(mine), 6)
-        np.add.at(k, (place[zone_owner[mine], None, None], dof[:, :, None], dof[:, None, :]), zone[mine])
-        vertex = first[these, None] + np.arange(n)
-        both = np.arange(2 * n)
-        k[:, both, both] += np.repeat(springs[vertex], 2, axis=1)
-        m = masses.vertex[vertex]
-        block = masses.block[these]
-        r = x[vertex] - ((m[:, :, None] * x[vertex]).sum(axis=1) / block[:, WHOLE, None])[:, None, :]
-        # M_eff^-1 = L L^T is not needed: its eigenvalues with K are those of S K S, with S^2 the inverse.
-        inverse = np.zeros_like(k)
-        inverse[:, both, both] = 1.0 / np.repeat(m, 2, axis=1)
-        for d in (0, 1):
-            inverse[:, d::2, d::2] += block[:, LIGHTER, None, None]
-        arm = np.stack([-r[..., 1], r[..., 0]], axis=-1).reshape(len(these), 2 * n)
-        inverse += block[:, NIMBLER, None, None] * arm[:, :, None] * arm[:, None, :]
-        lower = np.linalg.cholesky(inverse)
-        result[these] = np.linalg.eigvalsh(lower.transpose(0, 2, 1) @ k @ lower)[:, -1]
+        alike = np.flatnonzero(size == n)
+        for these in np.array_split(alike, -(-len(alike) * 4 * n * n // _TOGETHER)):
+            result[these] = _largest_of(bodies, masses, zone, springs, these)
     return result
+
+
+def _largest_of(
+    bodies: Bodies, masses: Masses, zone: np.ndarray, springs: np.ndarray, these: np.ndarray
+) -> np.ndarray:
+    """As `_largest`, for blocks (numbers in order of storage) of one number of vertices."""
+    first, block = masses.first[these], masses.block[these]
+    n = int(masses.first[these[0] + 1] - first[0])
+    place = np.full(len(masses.block), -1)
+    place[these] = np.arange(len(these))
+    owner = masses.owner[bodies.zone_vertex[:, 0]]
+    mine = np.flatnonzero(place[owner] >= 0)
+    corner = bodies.zone_vertex[mine] - masses.first[owner[mine], None]
+    dof = (2 * corner[:, :, None] + np.arange(2)).reshape(len(mine), 6)
+    stiffness = np.zeros((len(these), 2 * n, 2 * n))
+    np.add.at(stiffness, (place[owner[mine], None, None], dof[:, :, None], dof[:, None, :]), zone[mine])
+    vertex, both = first[:, None] + np.arange(n), np.arange(2 * n)
+    stiffness[:, both, both] += np.repeat(springs[vertex], 2, axis=1)
+    m, x = masses.vertex[vertex], bodies.position[vertex]
+    r = x - ((m[:, :, None] * x).sum(axis=1) / block[:, WHOLE, None])[:, None, :]
+    inverse = np.zeros_like(stiffness)
+    inverse[:, both, both] = 1.0 / np.repeat(m, 2, axis=1)
+    for d in (0, 1):
+        inverse[:, d::2, d::2] += block[:, LIGHTER, None, None]
+    arm = np.stack([-r[..., 1], r[..., 0]], axis=-1).reshape(len(these), 2 * n)
+    inverse += block[:, NIMBLER, None, None] * arm[:, :, None] * arm[:, None, :]
+    # With M_eff^-1 = L L^T the eigenvalues of M_eff^-1 K are those of the symmetric L^T K L.
+    lower = np.linalg.cholesky(inverse)
+    return np.linalg.eigvalsh(lower.transpose(0, 2, 1) @ stiffness @ lower)[:, -1]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numba.extending import overload
 
-from graben.mechanics.blocks.engine.masses import LESS, LESS_TURN, LIGHTER, NIMBLER, WHOLE
+from graben.mechanics.blocks.engine.masses import LIGHTER, NIMBLER, WHOLE
 from graben.mechanics.blocks.zones.elastic import ElasticZones, zone_forces
 from graben.mechanics.blocks.zones.plastic import PlasticZones, plastic_zone_forces
 from graben.mechanics.blocks.zones.rigid import RigidBlocks, move_rigid_blocks
@@ -80,7 +80,7 @@ def move_vertices(p, s, m, parts, load, alpha, local, dt, speed, sums):
         spin = block[b, NIMBLER] * (moment - (cx * fy - cy * fx)) * dt
         # Sums over the block of mass x velocity and of its moment: of the mean and of the new one.
         qx, qy, qw, px, py, pw = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        square, mean_square = 0.0, 0.0
+        square, mean_square, turn = 0.0, 0.0, 0.0
         for i in range(begin, end):
             weight = mass[i]
             push = dt / weight
@@ -101,6 +101,7 @@ def move_vertices(p, s, m, parts, load, alpha, local, dt, speed, sums):
             mean_y = 0.5 * (old_y + new_y)
             if local > 0.0:
                 damped += (free_x - tx) * mean_x + (free_y - ty) * mean_y
+            turn += weight * (rx * rx + ry * ry)
             square += weight * (new_x * new_x + new_y * new_y)
             mean_square += weight * (mean_x * mean_x + mean_y * mean_y)
             px += weight * new_x
@@ -115,9 +116,11 @@ def move_vertices(p, s, m, parts, load, alpha, local, dt, speed, sums):
             v[i, 1] = new_y
             x[i, 0] += dt * new_x
             x[i, 1] += dt * new_y
-        less, turn = block[b, LESS], block[b, LESS_TURN]
-        kinetic += 0.5 * (square - less * (px * px + py * py) - turn * pw * pw)
-        damped += alpha * (mean_square - less * (qx * qx + qy * qy) - turn * qw * qw)
+        # What inertia leaves out of the rigid motion, see `masses.inertial_force`.
+        less = block[b, LIGHTER] / (1.0 + block[b, LIGHTER] * block[b, WHOLE])
+        less_turn = block[b, NIMBLER] / (1.0 + block[b, NIMBLER] * turn)
+        kinetic += 0.5 * (square - less * (px * px + py * py) - less_turn * pw * pw)
+        damped += alpha * (mean_square - less * (qx * qx + qy * qy) - less_turn * qw * qw)
     sums[p, AT_KINETIC] = kinetic
     sums[p, AT_DAMPED] = damped
     sums[p, AT_LOAD] = load_work
@@ -144,7 +147,8 @@ def _move_held(b, row, last_row, s, m, load, alpha, local, dt, speed, ax, ay):
         held[still[k, 0] - begin, still[k, 1]] = True
     old = np.empty((count, 2))
     kinetic, damped, load_work, wall_work, rise = 0.0, 0.0, 0.0, 0.0, 0.0
-    light, less = block[b, LIGHTER], block[b, LESS]
+    light = block[b, LIGHTER]
+    less = light / (1.0 + light * block[b, WHOLE])
     for d in range(2):
         lift = ax if d == 0 else ay
         tied, short = 0.0, 0.0
@@ -194,11 +198,18 @@ def _move_held(b, row, last_row, s, m, load, alpha, local, dt, speed, ax, ay):
 
 
 @kernel(error_model="numpy")
-def _move_elastic(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):
+def _cleared(p, m, parts):
+    """Zone forces, none yet on the vertices of part p."""
     force = m.zone_force
     for i in range(parts.vertex[p], parts.vertex[p + 1]):
         for d in range(2):
             force[i, d] = 0.0
+    return force
+
+
+@kernel(error_model="numpy")
+def _move_elastic(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):
+    force = _cleared(p, m, parts)
     zone_forces(
         m.x,
         zones.triangles,
@@ -215,10 +226,7 @@ def _move_elastic(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):
 
 @kernel(error_model="numpy")
 def _move_plastic(zones, p, s, m, parts, load, alpha, local, dt, speed, sums):
-    force = m.zone_force
-    for i in range(parts.vertex[p], parts.vertex[p + 1]):
-        for d in range(2):
-            force[i, d] = 0.0
+    force = _cleared(p, m, parts)
     sums[p, AT_PLASTIC] = plastic_zone_forces(m.x, zones, force, parts.zone[p], parts.zone[p + 1])
     move_vertices(p, s, m, parts, load, alpha, local, dt, speed, sums)
 

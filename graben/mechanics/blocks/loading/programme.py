@@ -15,6 +15,7 @@ from graben.errors import Refused
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.courses import Course
 from graben.mechanics.blocks.loading.excavation import Dig, blocks_in
+from graben.mechanics.blocks.loading.failure import Failure, failure_of
 from graben.mechanics.blocks.loading.falling import Falling
 from graben.mechanics.blocks.loading.loads import Loads
 from graben.mechanics.blocks.loading.protocol import Moment, State, refuse_unlike
@@ -31,8 +32,8 @@ class Programme:
     end : load time at which the rise is complete, save_every : load time between saved states [s]
     tolerance : of `imbalance` at rest
     may_fall : whether blocks may fall without ending the test
-    looks : (load time [s], settlement [m], imbalance, way, resisted) after every chunk, see `Rise`; load_times : of
-    saved states [s]; first_look : the first since rates of loads last changed
+    looks : (load time [s], settlement [m], imbalance, way, resisted, step) after every chunk, see `Rise`;
+    load_times : of saved states [s]; first_look : the first since rates of loads last changed
     reference : (vertices, 2) positions at rest, carried : at the largest load [m]
     """
 
@@ -51,7 +52,7 @@ class Programme:
         self.model, self.loads, self.control = model, loads, control
         self.end, self.save_every, self.tolerance = end, save_every, tolerance
         self.rise, self.falling, self.may_fall = Rise(), Falling(model), may_fall
-        self.looks: list[tuple[float, float, float, float, float]] = []
+        self.looks: list[tuple[float, ...]] = []
         self.first_look = 0
         self.load_times: list[float] = []
         self.rest: np.ndarray = np.zeros(2)
@@ -111,13 +112,38 @@ class Programme:
         self._velocity = raise_load(
             model, self.loads, rise, self.control, self._velocity, end=self.end, stop=stop, reference=self.reference
         )
-        self.looks.append((rise.load_time, rise.settlement, rise.imbalance, rise.way, rise.resisted))
+        look = (rise.load_time, rise.settlement, rise.imbalance, rise.way, rise.resisted, float(model.steps_done))
+        self.looks.append(look)
         if rise.since != since:
             self.first_look = len(self.looks)
         if rise.load_time >= rise.largest:
             self.carried = model.motion.x.copy()
         if self.falling.look(model) and not self.may_fall:
             rise.failed = True
+
+    def look_table(self) -> np.ndarray:
+        """The looks as rows (looks, 6)."""
+        return np.array(self.looks).reshape(-1, 6)
+
+    def failure(self) -> Failure | None:
+        """Load at failure in seconds of rise, and the look there; None where nothing failed under a rising load.
+
+        Where blocks fell, what they bore counts until the first of them lost its last contact.
+        """
+        if not self.rise.failed:
+            return None
+        table = self.look_table()[self.first_look :]
+        if len(self.falling.blocks) and not self.may_fall:
+            table = table[table[:, 5] <= self.falling.step[self.falling.blocks].min()]
+        if not len(table):
+            return None
+        found = failure_of(table[:, 0], table[:, 3], table[:, 4])
+        return found._replace(look=found.look + self.first_look)
+
+    @property
+    def reached(self) -> float | None:
+        """Share of the rise that the loads came to; None where none was to rise."""
+        return min(1.0, self.rise.load_time / self.end) if self.looks else None
 
     def _dig(self, dig: Dig) -> None:
         """Take out the blocks of an excavation, the next one in turn."""
@@ -149,7 +175,7 @@ class Programme:
     def state(self) -> State:
         return {
             "rest": self.rest,
-            "looks": np.array(self.looks).reshape(-1, 5),
+            "looks": self.look_table(),
             "first_look": np.array(self.first_look),
             "velocity": self._velocity,
             "load_times": np.array(self.load_times),

@@ -90,7 +90,7 @@ def raise_load(
     chunk must not run past, nor does it run past points of courses; reference : positions settlement counts from
     """
     dt, point = model.dt, loads.next_point(rise.since)
-    left = max(1.0, np.rint((min(stop, point) - rise.load_time) / dt))
+    left = max(1.0, np.rint((min(stop, point, end) - rise.load_time) / dt))
     # Looks come close enough that the load changes by a thousandth between two of them.
     chunk = int(min(left, np.clip(1e-3 * rise.load_time / dt, 5, 100)))
     before, way = model.motion.x.copy(), model.way

@@ -30,7 +30,7 @@ def inverse(table, x, b):
     arm = np.column_stack([-r[:, 1], r[:, 0]]).ravel()
     one = np.zeros((2, 2 * n))
     one[0, 0::2] = one[1, 1::2] = 1.0
-    _, _, lighter, nimbler, _, _ = table.block[b]
+    _, lighter, nimbler = table.block[b]
     return these, np.diag(1.0 / np.repeat(m, 2)) + lighter * one.T @ one + nimbler * np.outer(arm, arm)
 
 
@@ -94,6 +94,14 @@ def test_no_motion_of_blocks_and_springs_is_too_fast_for_the_step(dt, zone_edge)
     model.dt *= 2.0
     with pytest.raises(Exception, match=r"speed|overlap|finite"):
         model.advance(3000)
+
+
+def test_blocks_looked_at_in_turn_have_the_masses_of_all_together(monkeypatch):
+    bodies = build_bodies(voronoi_blocks(SQUARE, 0.8, seed=2))
+    whole = model_of(bodies).masses
+    monkeypatch.setattr(masses, "_TOGETHER", 300)
+    for together, in_turn in zip(whole, model_of(bodies).masses, strict=True):
+        assert in_turn == pytest.approx(together, rel=1e-12)
 
 
 def test_a_long_block_turns_with_the_moment_of_inertia_of_its_area():

@@ -6,7 +6,6 @@ import pytest
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.courses import Course
-from graben.mechanics.blocks.loading.failure import failure_of
 from graben.mechanics.blocks.loading.falling import Falling
 from graben.mechanics.blocks.loading.loads import Loads, on_segment, pressure_forces
 from graben.mechanics.blocks.loading.programme import Control, Programme
@@ -34,7 +33,7 @@ def standing(shapes, outline, *, friction, end, steps, rounding=0.01, gravity=(0
     return model
 
 
-def failed(model, segment, course, end, control=None):
+def tried(model, segment, course, end, control=None):
     loads = Loads(len(model.bodies.position))
     loads.add(pressure_forces(model.bodies, *segment), course)
     test = Programme(model, loads, control or Control(), end=end, save_every=end, tolerance=1e-3)
@@ -42,9 +41,13 @@ def failed(model, segment, course, end, control=None):
         pass
     for _ in test.run():
         pass
+    return test
+
+
+def failed(model, segment, course, end, control=None):
+    test = tried(model, segment, course, end, control)
     assert test.rise.failed
-    looks = np.array(test.looks)
-    return failure_of(looks[:, 0], looks[:, 3], looks[:, 4]), looks
+    return test.failure(), test.look_table()
 
 
 @pytest.mark.parametrize(("width", "frame"), [(1.0, 10.0), (0.8, 10.0), (1.0, 5.0)])
@@ -86,6 +89,36 @@ def test_a_support_pressure_that_is_lowered_lets_the_block_go():
     course = Course([(0.0, 1.5 * exact), (end, 0.0)])
     failure, _ = failed(model, ((0.5, 1.5), (1, 1)), course, end)
     assert course.at(failure.load) == pytest.approx(exact, rel=0.01)
+
+
+def test_what_a_falling_block_ends_counts_until_it_lost_its_last_contact():
+    end = 40.0
+    shapes = [rectangle(0, -0.5, 2, 0), rectangle(0, 0, 2, 1)]
+    model = standing(shapes, rectangle(0, -0.5, 2, 1), friction=20.0, end=end, steps=10_000)
+    exact = RHO * G * 2.0 * np.tan(np.radians(20.0))
+    test = tried(model, ((0, 0), (0, 1)), Course([(0.0, 0.0)], 2.0 * exact / end), end)
+    whole, table = test.failure(), test.look_table()
+    half = np.searchsorted(table[:, 0], 0.5 * whole.load)
+    test.falling.step[1] = int(table[half, 5])
+    until = test.failure()
+    assert until.look <= half and until.load == pytest.approx(0.5 * whole.load, rel=0.01)
+    assert until.high < 0.52 * whole.load
+    test.may_fall = True
+    assert test.failure() == whole
+
+
+def test_a_body_that_bears_all_has_not_failed_and_one_that_never_tells_says_how_far_it_came():
+    end = 10.0
+    shapes = [rectangle(0, -0.5, 2, 0), rectangle(0, 0, 2, 1)]
+    outline = rectangle(0, -0.5, 2, 1)
+    exact = RHO * G * 2.0 * np.tan(np.radians(20.0))
+    model = standing(shapes, outline, friction=20.0, end=end, steps=4000)
+    test = tried(model, ((0, 0), (0, 1)), Course([(0.0, 0.0)], 0.5 * exact / end), end)
+    assert not test.rise.failed and test.failure() is None and test.reached == pytest.approx(1.0, rel=1e-6)
+    model = standing(shapes, outline, friction=20.0, end=end, steps=4000)
+    hasty = Control(beyond=1e6, patience=1.5)
+    test = tried(model, ((0, 0), (0, 1)), Course([(0.0, 0.0)], 2.0 * exact / end), end, hasty)
+    assert not test.rise.failed and 0.4 < test.reached < 0.6
 
 
 def test_blocks_that_lose_their_support_have_fallen():
