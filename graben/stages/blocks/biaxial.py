@@ -115,6 +115,7 @@ class BiaxialReport:
             "strain_at_peak": number(self._strain(float(arrays["time"][peak]), size[1])),
             "steps": self.model.steps_done,
             "loose_blocks": int(arrays["loose_blocks"].max()),
+            "flown_blocks": int(self.model.flown.sum()),
             "energy_error": energy_error(arrays),
             "kinetic_over_stored_energy": number(kinetic_share(arrays)[after].mean()),
             "lateral_over_applied_stress": number((lateral / applied)[after].mean()),
@@ -138,5 +139,10 @@ class BiaxialReport:
                 "the bottom bears {value} of what the top does: the test is too fast for its steps; take more of "
                 "them (numerics.steps) or a finer fidelity",
                 least=0.9,
+            ),
+            Measure(
+                "flown_blocks", headline["flown_blocks"], 0.0,
+                "{value} blocks lost touch, flew off under the confining pressure and were stopped: what comes after "
+                "their flight is less sure",
             ),
         ]  # fmt: skip

@@ -102,6 +102,7 @@ class BlockModel(ModelState):
         self.mass_ratio = made.mass.moving / np.add.reduceat(made.true_mass, made.mass.first[:-1])
         self.held = np.zeros((len(bodies.position), 2), dtype=bool)
         self.removed = np.zeros(len(bodies.block_area), dtype=bool)
+        self.flown = np.zeros(len(bodies.block_area), dtype=bool)
         self.excavated = 0.0
         self.weight = self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :]
         self.skeleton = setup.unloaded(self.skin, self.parts, made, self.weight)
@@ -187,8 +188,11 @@ class BlockModel(ModelState):
             if status == relaxation.REBUILD:
                 if done == 0 and not np.isfinite(self.motion.x).all():
                     raise NumericsFailed("a position is not finite", step=self.steps_done, advice=_SLOWER)
+                self._stop_flying()
                 self.rebuild()
             elif status == relaxation.RUNAWAY:
+                if self._stop_flying():
+                    continue
                 speed = np.hypot(*self.motion.v.T)
                 worst = int(np.argmax(np.where(np.isfinite(speed), speed, np.inf)))
                 raise NumericsFailed(
@@ -347,14 +351,34 @@ class BlockModel(ModelState):
         For slow loading without gravity, where a block that is pressed out flies on for ever.
         """
         loose = self.loose_blocks()
-        energy = self.kinetic_energy(loose)
-        there = loose[self.bodies.vertex_block]
+        self._stop(loose)
+        return loose
+
+    def _stop(self, blocks: np.ndarray) -> None:
+        """Stop blocks (flags) where they are; what they moved with counts as damped."""
+        energy = self.kinetic_energy(blocks)
+        there = blocks[self.bodies.vertex_block]
         self.motion.v[there] = 0.0
         if isinstance(self.skeleton.zones, RigidBlocks):
             self.skeleton.zones.stop(there)
         self.motion.ledger[KINETIC] -= energy
         self.motion.ledger[DAMPED] += energy
-        return loose
+
+    def _stop_flying(self) -> bool:
+        """Whether blocks without weight flew off, and were stopped: dead loads alone drive them, one way or another.
+
+        No other block touches them, and they are free along an axis at least: rollers guide some.
+        """
+        if self.weight.any():
+            return False
+        block, count = self.bodies.vertex_block, len(self.removed)
+        touched = self.motion.joint_force.any(axis=1) | self.held.all(axis=1)
+        fast = np.hypot(*self.motion.v.T) > _FLIGHT * self.fastest
+        flying = (np.bincount(block, fast, count) > 0) & (np.bincount(block, touched, count) == 0)
+        if flying.any():
+            self._stop(flying)
+            self.flown |= flying
+        return bool(flying.any())
 
     def begin_ledger(self) -> None:
         """From now on work and losses count from nothing."""
@@ -362,5 +386,8 @@ class BlockModel(ModelState):
         self.motion.ledger[:] = 0.0
         self.motion.ledger[LARGEST_OVERLAP] = overlap
 
+
+# Share of the speed that a step can follow; walls of a slow test move a hundred times slower.
+_FLIGHT = 0.1
 
 _SLOWER = "take more steps (slower loading or a smaller time step) or look at that block's shape"

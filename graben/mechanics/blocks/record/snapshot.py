@@ -28,6 +28,7 @@ def take(model: BlockModel) -> dict[str, np.ndarray]:
                 result[f"{group}.{name}"] = value.copy()
     result["held"] = model.held.copy()
     result["removed"] = model.removed.copy()
+    result["flown"] = model.flown.copy()
     result["excavated"] = np.array(model.excavated)
     result["time"] = np.array(model.time)
     for name in _COUNTERS:
@@ -69,6 +70,7 @@ def bring_back(model: BlockModel, state: dict[str, np.ndarray]) -> None:
         _within("zones.flag", model.skeleton.zones.flag, ELASTIC, LOST)
     model.motion = model.motion._replace(rows=sleep["rows"])
     model.removed[:] = state["removed"]
+    model.flown[:] = state["flown"]
     model.weight[model.removed[model.bodies.vertex_block]] = 0.0
     model.excavated = float(state["excavated"])
     model.time = float(state["time"])

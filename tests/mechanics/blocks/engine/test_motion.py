@@ -233,3 +233,26 @@ def test_wrong_properties_are_refused():
         BlockModel(bodies, young=1e9, poisson=0.5, density=2700.0, joint=joint, rounding=0.05)
     with pytest.raises(ValueError, match="upright rectangle"):
         rectangle_sides(np.array([(0, 0), (2, 0), (1, 1.0)]))
+
+
+@pytest.mark.parametrize("guided", [False, True])
+@pytest.mark.parametrize("rigid", [False, True])
+def test_a_block_that_dead_loads_drive_off_is_stopped_and_others_run_away(guided, rigid):
+    shapes = [rectangle(0, 0, 1, 1), rectangle(3, 0, 4, 1)]
+    bodies = build_bodies(from_polygons(shapes, rectangle(0, 0, 4, 1)))
+    joint = Joint(1e9, 1e9, 0.6, 0.0, 0.0, 0.0, np.inf)
+    keys = {"young": 1e9, "poisson": 0.2, "density": 2500.0, "joint": joint, "rounding": 0.05, "dt": 1e-3}
+    model = BlockModel(bodies, **keys, rigid=rigid)
+    off = bodies.vertex_block == 1
+    if guided:  # as by a roller: it still flies along
+        model.hold(off & (bodies.position[:, 1] == 1.0), 1)
+    model.skeleton.steady[off, 0] = 1e5
+    model.advance(20_000)
+    assert model.flown.tolist() == [False, True]
+    assert np.hypot(*model.motion.v.T).max() <= 0.11 * model.fastest
+    e = model.energies()
+    assert abs(e["error"]) < 0.01 * e["external"]
+    again = BlockModel(bodies, **keys, rigid=rigid, gravity=(0.0, -1e-9))
+    again.skeleton.steady[off, 0] = 1e5
+    with pytest.raises(NumericsFailed, match="speed"):
+        again.advance(40_000)
