@@ -118,6 +118,17 @@ def mobility(masses: Masses, x: np.ndarray, force: np.ndarray) -> float:
     return float(((force**2).sum(axis=1) / masses.vertex).sum() + rigid.sum())
 
 
+def rigid_motion(masses: Masses, x: np.ndarray, v: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """Velocities (vertices, 2) of the rigid motions of the blocks, along what is held (flags) nothing."""
+    m, owner, count = masses.vertex, masses.owner, len(masses.block)
+    arm, push, moment = _resultants(masses, x, m[:, None] * v)
+    turn = np.bincount(owner, m * (arm**2).sum(axis=1), count)
+    fixed = np.column_stack([np.bincount(owner, held[:, d], count) > 0 for d in (0, 1)])
+    middle = np.where(fixed, 0.0, push / masses.block[:, WHOLE, None])
+    spin = np.where(fixed.any(axis=1), 0.0, moment / turn)[owner]
+    return middle[owner] + spin[:, None] * np.column_stack([-arm[:, 1], arm[:, 0]])
+
+
 def kinetic_energies(masses: Masses, x: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Kinetic energy (blocks in order of storage,) [J/m]."""
     power = (v * inertial_force(masses, x, v)).sum(axis=1)

@@ -96,6 +96,24 @@ def test_no_motion_of_blocks_and_springs_is_too_fast_for_the_step(dt, zone_edge)
         model.advance(3000)
 
 
+@pytest.mark.parametrize("every", [3, 8])
+def test_stopping_a_block_over_and_over_feeds_no_vibration(every):
+    # Close to the limit of the step, a vibration whose velocity is set to nothing again and again would grow.
+    bodies = build_bodies(from_polygons([rectangle(0, 0, 1, 1)], rectangle(0, 0, 1, 1)))
+    model = model_of(bodies, damping=Damping(ratio=-1.0))
+    rng = np.random.default_rng(7)
+    model.motion.v[:] = 1e-4 * rng.standard_normal(bodies.position.shape) + [0.01, -0.02]
+    strain = []
+    for _ in range(300):
+        model.advance(every)
+        model.calm_loose_blocks()
+        strain.append(model.energies()["strain"])
+    assert max(strain[200:]) < 1.2 * max(strain[:50])
+    # It stays where it was stopped first, a few steps from its start.
+    middle = model.motion.x.mean(axis=0) - [0.5, 0.5]
+    assert np.abs(middle).max() < 0.021 * every * model.dt
+
+
 def test_blocks_looked_at_in_turn_have_the_masses_of_all_together(monkeypatch):
     bodies = build_bodies(voronoi_blocks(SQUARE, 0.8, seed=2))
     whole = model_of(bodies).masses

@@ -217,7 +217,7 @@ def test_loose_blocks_are_found_and_stopped():
     before = model.energies()
     model.calm_loose_blocks()
     after = model.energies()
-    assert model.kinetic_energy(loose) == 0.0
+    assert model.kinetic_energy(loose) < 1e-15 * before["kinetic"]
     assert after["error"] == pytest.approx(before["error"], abs=1e-9)
     place = model.motion.x[bodies.vertex_block == 2].copy()
     model.advance(100)
