@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -49,10 +50,16 @@ def ratio(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
 
 
 def energy_error(arrays: dict[str, np.ndarray]) -> float:
-    """Largest error of the ledger over the work done and the energy stored."""
-    stored = arrays["energy_strain"] + arrays["energy_joint"]
-    work = abs(arrays["energy_boundary"]) + abs(arrays["energy_external"]) + stored
-    return float(ratio(np.abs(arrays["energy_error"]), work).max())
+    """Largest error of the ledger over its turnover."""
+    energies = {name.removeprefix("energy_"): values for name, values in arrays.items() if name.startswith("energy_")}
+    return float(ratio(np.abs(arrays["energy_error"]), turnover(energies)).max())
+
+
+def turnover(energies: Mapping[str, Any]) -> Any:
+    """Work done, or taken up where it turned back, and the energy stored; by names of the ledger [J/m]."""
+    taken = sum(energies.get(name, 0.0) for name in ("kinetic", "friction", "plastic", "damping", "excavated"))
+    given = abs(energies["boundary"]) + abs(energies["external"])
+    return np.maximum(given, taken) + energies["strain"] + energies["joint"]
 
 
 def kinetic_share(arrays: dict[str, np.ndarray]) -> np.ndarray:

@@ -24,7 +24,7 @@ from graben.stages.blocks.geometry import Ground, lay_out
 from graben.stages.blocks.model import block_model
 from graben.stages.blocks.output import write_vtk
 from graben.stages.blocks.programme import ProgrammeReport, programme
-from graben.stages.blocks.report import Report
+from graben.stages.blocks.report import Report, turnover
 from graben.stages.blocks.sizes import sizes_of, steps_of
 from graben.stages.shared.estimate import Estimate, refuse_too_large
 from graben.stages.shared.last_good import keep_by, keeps_last_good, write_whole
@@ -83,7 +83,8 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         for moment in test.run():
             if moment.save:
                 history.save()
-                _check_ledger(history, scene.numerics.energy_limit, model.steps_done)
+                if not test.failed:
+                    _check_ledger(history, scene.numerics.energy_limit, model.steps_done)
                 keeper.keep(model, history, test.state())
             progress(moment.fraction, moment.words)
     except (NumericsFailed, KeyboardInterrupt):
@@ -176,9 +177,9 @@ def _bring_back(path: Path, model: BlockModel, test: Loading, history: History, 
 
 def _check_ledger(history: History, limit: float, step: int) -> None:
     e = history.model.energies()
-    turnover = abs(e["boundary"]) + abs(e["external"]) + e["strain"] + e["joint"]
     first = history.rows["energy"][0][-1]
-    error = abs(e["error"] - first) / turnover
+    # The kinetic energy is that of half a step before the stored one: after a shock it is off by up to its size.
+    error = max(abs(e["error"] - first) - e["kinetic"], 0.0) / max(turnover(e), 1e-300)
     if not error < limit:
         raise NumericsFailed(
             f"energy error {100 * error:.2g} % (limit {100 * limit:.2g} %)",

@@ -98,19 +98,27 @@ class ModelState:
         return masses.mobility(self.skeleton.mass, self.motion.x, np.where(self.held, 0.0, self.skeleton.rising))
 
     def block_imbalance(self) -> np.ndarray:
-        """Resultant on each block (blocks,) over the sizes of the forces that bear on it; 1 in free fall.
+        """Resultant on each block (blocks,) over the sizes of the forces that bear on it; 1 in free fall."""
+        return self.block_share(self.motion.joint_force + self.load())
+
+    def block_share(self, force: np.ndarray) -> np.ndarray:
+        """Resultants (blocks,) of forces (vertices, 2) [N/m] over the sizes of the forces that bear on the blocks.
 
         Blocks with a prescribed velocity, and those taken out, count as balanced.
         """
         m, b, count = self.motion, self.bodies, len(self.bodies.block_area)
         load = self.load()
-        force = m.joint_force + load
         total = np.hypot(*(np.bincount(b.vertex_block, f, count) for f in force.T))
         size = np.bincount(b.vertex_block, np.hypot(*m.joint_force.T), count)
         size += np.hypot(*(np.bincount(b.vertex_block, f, count) for f in load.T))
         still = np.bincount(b.vertex_block, self.held.any(axis=1), count) > 0
-        ratio = np.divide(total, size, out=np.zeros(count), where=size > 0.0)
+        ratio = np.divide(total, size, out=np.zeros(count), where=size > self.rounding_force)
         return np.where(still | self.removed, 0.0, ratio)
+
+    @property
+    def rounding_force(self) -> float:
+        """Forces below this [N/m] are rounding errors of positions."""
+        return 1e-12 * max(j.stiffest for j in self.joints) * float(self.bodies.block_area.max())
 
     def contact_force(self) -> np.ndarray:
         """Forces (vertices, 2) of all contacts [N/m], from where the blocks are now."""

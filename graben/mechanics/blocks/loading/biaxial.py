@@ -152,6 +152,8 @@ class Biaxial:
     check : of forces; the loading then follows it, at a pace of its own
     """
 
+    failed = False
+
     def __init__(
         self,
         model: BlockModel,

@@ -3,6 +3,9 @@
 A test of finite speed shows more: what moves has inertia and is damped. Both are known along the way, so their
 share of the load can be taken off. With P = dF/ds . v the power of the load per unit of it, and R the power that
 inertia and damping take up, the load in balance with the rock alone is s - R / P, both averaged over a stretch.
+
+Friction that grows with the load takes up a part of what the load is too large by: s - R / P then is too high. On a
+plane of slope a, R / P is the share 1 - tan(phi) / tan(a) of it.
 """
 
 from __future__ import annotations
@@ -14,20 +17,27 @@ import numpy as np
 # Averages of inertia are taken over this share of the way so far, half of it before and half behind.
 _STRETCH = 0.05
 
-# What a test repeated with other steps differs by, where inertia has no share in it.
-_REPEATS = 0.005
+# What friction may hide, over what inertia and damping were seen to bear: enough where R / P is a third of it.
+_HIDDEN = 2.0
+
+# Two looks are far apart if their loads differ by this share.
+_APART = 0.1
+
+# Steps over which a speed is a mean.
+_SPEED = 200
 
 
 class Failure(NamedTuple):
     """In units of the load: what is borne at rest, an interval that holds it, and the index of the look there.
 
-    high is the largest load of the test; low lies as far below what is borne at rest as high lies above it.
+    inertia : what inertia and damping bear at that look
     """
 
     load: float
     low: float
     high: float
     look: int
+    inertia: float = 0.0
 
 
 def static_load(load: np.ndarray, way: np.ndarray, resisted: np.ndarray) -> np.ndarray:
@@ -46,9 +56,49 @@ def static_load(load: np.ndarray, way: np.ndarray, resisted: np.ndarray) -> np.n
 
 
 def failure_of(load: np.ndarray, way: np.ndarray, resisted: np.ndarray) -> Failure:
-    """The largest static load of a test, with its interval; arguments as in `static_load`."""
+    """The largest static load of a test, with its interval; arguments as in `static_load`.
+
+    high is the largest load of the test; low lies twice as far below the static one, for what friction hides.
+    """
     static = static_load(load, way, resisted)
     look = int(np.argmax(static))
     most, largest = float(static[look]), float(load.max())
-    slack = _REPEATS * abs(most)
-    return Failure(most, 2.0 * most - largest - slack, largest + slack, look)
+    return Failure(most, most - _HIDDEN * (largest - most), largest, look, float(load[look]) - most)
+
+
+def loss_of_balance(load: np.ndarray, step: np.ndarray, balanced: int, out: int, lost: int, share: float) -> Failure:
+    """The load at which a block loses its balance, between a look at which it had it and one at which it had not.
+
+    What moves it grows with the load from there on, and so does the share of it that inertia and damping take up.
+    Where the two looks are far apart, the load lies between them: the block does not tell more.
+
+    Parameters
+    ----------
+    load, step : (n,) at each look
+    balanced, out, lost : steps at which it was last in balance, was out of it, and had lost it beyond doubt
+    share : what inertia and damping took up at the first over what they took up at the second
+    """
+    look, after, last = (int(np.clip(np.searchsorted(step, s), 0, len(step) - 1)) for s in (balanced, out, lost))
+    there, beyond = float(load[look]), float(load[after])
+    high = float(load[look : max(last, look) + 1].max())
+    if beyond - there > _APART * abs(beyond):
+        return Failure(beyond, there, high, after)
+    most = there - share / (1.0 - share) * max(beyond - there, 0.0)
+    return Failure(most, 2.0 * most - high, high, look)
+
+
+def tenfold_speed(load: np.ndarray, way: np.ndarray, step: np.ndarray) -> float | None:
+    """The load at which the way first grew ten times as fast as it did at first; None where it never did.
+
+    Arguments as above. The first speed is the mean one up to a twentieth of the largest load.
+    """
+    apart = (
+        np.concatenate([[0], np.flatnonzero(np.diff(step // _SPEED)) + 1]) if len(step) else np.zeros(0, dtype=int)
+    )
+    if len(apart) < 3 or not load.max() > 0.0:
+        return None
+    load, way, step = load[apart], way[apart], step[apart]
+    k = max(1, int(np.argmax(load >= 0.05 * load.max())))
+    first = (way[k] - way[0]) / (step[k] - step[0])
+    fast = np.diff(way[k:]) > 10.0 * first * np.diff(step[k:])
+    return float(load[k:][int(np.argmax(fast))]) if first > 0.0 and fast.any() else None

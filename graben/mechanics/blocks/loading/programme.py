@@ -1,7 +1,7 @@
 """Loads on any outline: weight and steady pressures until rest, then pressures that rise until failure, and digging.
 
-Loads rise as if a stiff frame held them (see rise.py), so that they pass the failure and fall with the body. Blocks
-that fall are a failure too, at rest and later.
+Loads rise as if a stiff frame held them (see rise.py), so that they pass the failure and fall with the body. A body
+that bears them all comes to rest under them, or fails there. Blocks that fall are a failure too, at any time.
 """
 
 from __future__ import annotations
@@ -15,15 +15,19 @@ from graben.errors import Refused
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.courses import Course
 from graben.mechanics.blocks.loading.excavation import Dig, blocks_in
-from graben.mechanics.blocks.loading.failure import Failure, failure_of
+from graben.mechanics.blocks.loading.failure import Failure, failure_of, loss_of_balance, tenfold_speed
 from graben.mechanics.blocks.loading.falling import Falling
 from graben.mechanics.blocks.loading.loads import Loads
 from graben.mechanics.blocks.loading.protocol import Moment, State, refuse_unlike
-from graben.mechanics.blocks.loading.rest import imbalance, settle
-from graben.mechanics.blocks.loading.rise import Control, Rise, raise_load
+from graben.mechanics.blocks.loading.resistance import Resistance
+from graben.mechanics.blocks.loading.rest import REST_DAMPING, imbalance, settle
+from graben.mechanics.blocks.loading.rise import Control, Rise, hold_load, raise_load
 
 # A block is at rest when its resultant is this share of the forces that bear on it.
 _BLOCK_REST = 0.02
+
+# Steps between two looks at a body that is held, and the least number of steps after which it counts as restless.
+_HOLD, _RESTLESS = 100, 20_000
 
 
 class Programme:
@@ -35,6 +39,7 @@ class Programme:
     looks : (load time [s], settlement [m], imbalance, way, resisted, step) after every chunk, see `Rise`;
     load_times : of saved states [s]; first_look : the first since rates of loads last changed
     reference : (vertices, 2) positions at rest, carried : at the largest load [m]
+    at_rest : whether the body is at rest under all that acts at the end; None where the end was not reached
     """
 
     def __init__(
@@ -52,6 +57,8 @@ class Programme:
         self.model, self.loads, self.control = model, loads, control
         self.end, self.save_every, self.tolerance = end, save_every, tolerance
         self.rise, self.falling, self.may_fall = Rise(), Falling(model), may_fall
+        self.resistance = Resistance(model)
+        self.at_rest: bool | None = None
         self.looks: list[tuple[float, ...]] = []
         self.first_look = 0
         self.load_times: list[float] = []
@@ -62,7 +69,6 @@ class Programme:
         self._saved_at = model.time
         self._digs = sorted(digs, key=lambda dig: dig.time)
         self._dug = 0
-        self._velocity = np.zeros_like(self.reference)
         self._released: list[tuple[float, float, np.ndarray]] = []  # from, over, forces
         loads.begin(model, 0.0)
 
@@ -73,8 +79,9 @@ class Programme:
         advice = "the body does not stand; strengthen the joints or support it"
         for ratio in settle(m, self.tolerance, self._unrest, limit=100_000, where=where, advice=advice):
             yield Moment(0.0, f"coming to rest, {m.steps_done} steps, unbalanced force ratio {ratio:.2g}")
-            if self.falling.look(m, resting=True) and not self.may_fall:
-                self.rise.failed = True
+            self.resistance.look(m)
+            if self.falling.look(m, self.resistance.force, steady=True) and not self.may_fall:
+                self.rise.failed = self.rise.fell = True
                 break
         self.rest = np.array([ratio, m.steps_done])
         self.reference = m.motion.x.copy()
@@ -93,6 +100,7 @@ class Programme:
             m.begin_ledger()
             yield self._moment(save=True)
         if not self.loads.direction.any() and not self._digs:
+            self.at_rest = not rise.failed
             return
         end = self.end * (1.0 - 1e-9)
         while rise.load_time < end and not rise.failed and rise.steps * m.dt < self.control.patience * self.end:
@@ -101,25 +109,54 @@ class Programme:
                     yield self._moment(save=True)
                 self._dig(self._digs[self._dug])
             self._step(self._digs[self._dug].time if self._dug < len(self._digs) else np.inf)
-            yield self._moment(save=rise.failed or rise.load_time >= min(end, self._next_save))
+            yield self._moment(save=rise.failed or end > rise.load_time >= self._next_save)
+        if rise.load_time >= end and not rise.failed:
+            yield from self._hold()
         if m.time > self._saved_at:
             yield self._moment(save=True)
+
+    def _hold(self) -> Iterator[Moment]:
+        """Let the body come to rest under all that acts now, or fail."""
+        m, rise, damping = self.model, self.rise, self.model.damping
+        if rise.load_time > self.end:
+            m.set_load(self.end - rise.since)
+            rise.load_time = self.end
+        self.at_rest = False
+        m.damp(REST_DAMPING)
+        while not rise.failed and not self.at_rest and rise.held < max(_RESTLESS, rise.steps - rise.held):
+            hold_load(
+                m, rise, self.control, self.resistance,
+                steps=_HOLD, direction=self.loads.direction, reference=self.reference,
+            )  # fmt: skip
+            self._look(steady=True)
+            ratio = self._unrest(m)
+            self.at_rest = not rise.failed and ratio < self.tolerance
+            yield Moment(1.0, f"under the whole load, {rise.held} steps, unbalanced force ratio {ratio:.2g}")
+        m.damp(damping)
 
     def _step(self, stop: float) -> None:
         """One chunk of steps under the loads as they rise. stop : load time that it must not run past [s]"""
         model, rise = self.model, self.rise
         since = rise.since
-        self._velocity = raise_load(
-            model, self.loads, rise, self.control, self._velocity, end=self.end, stop=stop, reference=self.reference
-        )
-        look = (rise.load_time, rise.settlement, rise.imbalance, rise.way, rise.resisted, float(model.steps_done))
-        self.looks.append(look)
+        raise_load(
+            model, self.loads, rise, self.control, self.resistance,
+            end=self.end, stop=stop, reference=self.reference,
+        )  # fmt: skip
+        self._look()
         if rise.since != since:
             self.first_look = len(self.looks)
+
+    def _look(self, *, steady: bool = False) -> None:
+        """Note where the rise stands, and see whether blocks fall. steady : no load changes"""
+        model, rise = self.model, self.rise
+        look = (rise.load_time, rise.settlement, rise.imbalance, rise.way, rise.resisted, float(model.steps_done))
+        self.looks.append(look)
         if rise.load_time >= rise.largest:
             self.carried = model.motion.x.copy()
-        if self.falling.look(model) and not self.may_fall:
-            rise.failed = True
+        if self.falling.look(model, self.resistance.force, steady=steady) and not self.may_fall:
+            rise.failed = rise.fell = True
+        elif rise.failed:
+            self.falling.fail(model)
 
     def look_table(self) -> np.ndarray:
         """The looks as rows (looks, 6)."""
@@ -128,17 +165,46 @@ class Programme:
     def failure(self) -> Failure | None:
         """Load at failure in seconds of rise, and the look there; None where nothing failed under a rising load.
 
-        Where blocks fell, what they bore counts until the first of them lost its last contact.
+        Where a block fell, the load at which it lost its balance is the failure load if it is the lower one. Where
+        the body failed as a whole, it is the failure load if it is known more closely.
         """
-        if not self.rise.failed:
+        table = self.look_table()
+        stretch = table[self.first_look :]
+        if not self.rise.failed or not len(stretch):
             return None
+        first, fell = None if self.may_fall else self.falling.first(), self.rise.fell
+        if first is not None and not fell and first.out > stretch[int(np.argmax(stretch[:, 0])), 5]:
+            # It was in balance when the load fell already: what came then are swings.
+            first = None
+        until = stretch[stretch[:, 5] <= max(first.out, stretch[0, 5])] if first is not None and fell else stretch
+        found = failure_of(until[:, 0], until[:, 3], until[:, 4])
+        found = found._replace(look=found.look + self.first_look)
+        if first is not None:
+            single = loss_of_balance(table[:, 0], table[:, 5], *first[1:])
+            single = single._replace(inertia=found.inertia)
+            if fell:
+                low = min(found.low, single.low)
+                found = min(found, single, key=lambda failure: failure.load)._replace(low=low, high=single.high)
+            else:
+                found = min(found, single, key=lambda failure: failure.high - failure.low)
+        return found
+
+    def tenfold_speed(self) -> float | None:
+        """Load in seconds of rise at which the ground first moved ten times as fast as at first."""
         table = self.look_table()[self.first_look :]
-        if len(self.falling.blocks) and not self.may_fall:
-            table = table[table[:, 5] <= self.falling.step[self.falling.blocks].min()]
-        if not len(table):
+        return tenfold_speed(table[:, 0], table[:, 3], table[:, 5])
+
+    def first_fall(self) -> float | None:
+        """Load in seconds of rise at which the block that fell first lost its balance."""
+        first, table = self.falling.first(), self.look_table()
+        if first is None or not len(table):
             return None
-        found = failure_of(table[:, 0], table[:, 3], table[:, 4])
-        return found._replace(look=found.look + self.first_look)
+        return float(table[min(int(np.searchsorted(table[:, 5], first.out)), len(table) - 1), 0])
+
+    @property
+    def failed(self) -> bool:
+        """Whether the body has failed, under its loads or before."""
+        return self.rise.failed
 
     @property
     def reached(self) -> float | None:
@@ -154,7 +220,7 @@ class Programme:
         if dig.relax_over > 0.0:
             self._release(rise.load_time, dig.relax_over, forces)
         self.loads.begin(m, rise.load_time)
-        rise.begin(rise.load_time)
+        rise.dig(rise.load_time)
         self.first_look = len(self.looks)
 
     def _release(self, start: float, over: float, forces: np.ndarray) -> None:
@@ -177,7 +243,6 @@ class Programme:
             "rest": self.rest,
             "looks": self.look_table(),
             "first_look": np.array(self.first_look),
-            "velocity": self._velocity,
             "load_times": np.array(self.load_times),
             "reference": self.reference,
             "carried": self.carried,
@@ -187,6 +252,7 @@ class Programme:
             "released": np.array([released[:2] for released in self._released]).reshape(-1, 2),
             "released_forces": np.array([forces for _, _, forces in self._released]).reshape(-1, *self.carried.shape),
             **self.falling.state(),
+            **self.resistance.state(),
             **{f"rise_{k}": np.array(v) for k, v in asdict(self.rise).items()},
         }
 
@@ -199,8 +265,9 @@ class Programme:
         self.rest, self.reference, self.carried = state["rest"], state["reference"], state["carried"]
         self.looks = [tuple(row) for row in state["looks"].tolist()]
         self.load_times = state["load_times"].tolist()
-        self.first_look, self._velocity = int(state["first_look"]), state["velocity"]
+        self.first_look = int(state["first_look"])
         self.falling.bring_back(state)
+        self.resistance.bring_back(self.model, state)
         self._next_save, self._saved_at = float(state["next_save"]), float(state["saved_at"])
         self._dug = int(state["dug"])
         self.loads.take_off(self.model.removed[self.model.bodies.vertex_block])

@@ -31,6 +31,10 @@ class Loading(Protocol):
     rest: np.ndarray
     """(2,) unbalanced force ratio at which the model came to rest, and the steps that took."""
 
+    @property
+    def failed(self) -> bool:
+        """Whether the body has failed. A fall may be fast: the energy that it loses is told, and stops nothing."""
+
     def begin(self) -> Iterator[Moment]:
         """Bring the model to rest under what acts from the start. NumericsFailed where it does not come to rest."""
 

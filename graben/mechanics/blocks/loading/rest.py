@@ -10,16 +10,19 @@ from graben.errors import NumericsFailed
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
 
 # Rest comes soonest with more damping than a wall that moves, or a load that rises, should feel.
-_DAMPING = 1.0
+REST_DAMPING = Damping(ratio=1.0)
 
 
 def imbalance(model: BlockModel) -> float:
     """Mean size of unbalanced forces on free vertices over the mean size of zone forces.
 
-    Unlike the largest unbalanced force it does not hang on one small block.
+    Unlike the largest unbalanced force it does not hang on one small block. Where no force acts it is nothing.
     """
+    left = float(np.hypot(*model.unbalanced_force().T).mean())
     scale = float(np.hypot(*model.motion.zone_force.T).mean())
-    return float(np.hypot(*model.unbalanced_force().T).mean()) / scale if scale > 0.0 else np.inf
+    if max(left, scale) < model.rounding_force:
+        return 0.0
+    return left / scale if scale > 0.0 else np.inf
 
 
 def settle(
@@ -38,7 +41,7 @@ def settle(
     """
     ratio = np.inf
     damping = model.damping
-    model.damp(Damping(ratio=_DAMPING))
+    model.damp(REST_DAMPING)
     for _ in range(0, limit, chunk):
         model.advance(chunk)
         ratio = measure(model)

@@ -19,10 +19,14 @@ import numpy as np
 
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.loads import Loads, settlement_of
+from graben.mechanics.blocks.loading.resistance import Resistance
 from graben.mechanics.blocks.loading.rest import imbalance
 
 # Share of the whole rise over which a load sets in, and after which its compliance is known.
 _SET_IN = 0.02
+
+# A load of so much more than another one is hardly more.
+_HARDLY = 1.002
 
 # The frame adds at most this share to the squared frequency that the time step bears.
 _STABLE = 0.25
@@ -45,16 +49,21 @@ class Control:
 class Rise:
     """Where a rising load stands.
 
-    load_time : load, in seconds of even rise; since : load time at which rates of loads last changed
+    load_time : load, in seconds of even rise; start : load time at which rates of loads last changed
+    since : that from which the model's load counts, at which blocks were dug out last; way_since : the way there
     settlement : m, displacement along the loads, weighted by them; imbalance : as of `rest.imbalance`
-    way : work per unit of load since then [J s/m]; resisted : energy that inertia and damping took up [J/m]
+    way : work per unit of load from start on [J s/m]; resisted : energy that inertia and damping took up [J/m]
     compliance : largest way per second of rise; speed : way per second now, over it
-    largest, way_there : the largest load since then, and the way there; chunk_time : of the last chunk [s]
-    steps : taken; failed : whether the ground went on without more load
+    largest : the largest load since then
+    reached, way_there : the load that was hardly surpassed since, and the way there
+    steps : taken, held : those of them under the whole load
+    failed : whether the ground went on without more load, or blocks fell; fell : the latter
     """
 
     load_time: float = 0.0
+    start: float = 0.0
     since: float = 0.0
+    way_since: float = 0.0
     settlement: float = 0.0
     imbalance: float = 0.0
     way: float = 0.0
@@ -62,15 +71,23 @@ class Rise:
     compliance: float = 0.0
     speed: float = 0.0
     largest: float = 0.0
+    reached: float = 0.0
     way_there: float = 0.0
-    chunk_time: float = 0.0
     steps: int = 0
+    held: int = 0
     failed: bool = False
+    fell: bool = False
 
     def begin(self, load_time: float) -> None:
         """Rates change: what the body answered before says nothing of what it will."""
-        self.load_time = self.since = self.largest = load_time
+        self.start = self.reached = load_time
         self.way = self.way_there = self.compliance = self.speed = 0.0
+        self.dig(load_time)
+
+    def dig(self, load_time: float) -> None:
+        """The body changes; the loads go on as before."""
+        self.load_time = self.since = self.largest = load_time
+        self.way_since = self.way
 
 
 def raise_load(
@@ -78,57 +95,87 @@ def raise_load(
     loads: Loads,
     rise: Rise,
     control: Control,
-    velocity: np.ndarray,
+    resistance: Resistance,
     *,
     end: float,
     stop: float,
     reference: np.ndarray,
-) -> np.ndarray:
-    """One chunk of steps, which brings `rise` up to date; returns the mean velocity (vertices, 2) in it [m/s].
+) -> None:
+    """One chunk of steps, which brings `rise` and `resistance` up to date.
 
-    velocity : that of the chunk before; end : load time at which the rise is complete [s]; stop : load time that the
-    chunk must not run past, nor does it run past points of courses; reference : positions settlement counts from
+    end : load time at which the rise is complete [s]; stop : load time that the chunk must not run past, nor does it
+    run past points of courses; reference : positions settlement counts from
     """
     dt, point = model.dt, loads.next_point(rise.since)
     left = max(1.0, np.rint((min(stop, point, end) - rise.load_time) / dt))
     # Looks come close enough that the load changes by a thousandth between two of them.
     chunk = int(min(left, np.clip(1e-3 * rise.load_time / dt, 5, 100)))
-    before, way = model.motion.x.copy(), model.way
     model.raise_load(*_rate(model, rise, control, end))
-    model.advance(chunk)
+    gone, seconds = _advance(model, rise, resistance, chunk, loads.direction, reference)
     model.raise_load(0.0)
-    seconds, gone = chunk * dt, model.way - way
-    mean = (model.motion.x - before) / seconds
-    # Velocities are means of chunks, so vibration drops out of the acceleration.
-    acceleration = (mean - velocity) / (0.5 * (seconds + (rise.chunk_time or seconds)))
-    rise.resisted += float((model.resistance(acceleration, mean) * mean).sum()) * seconds
-    rise.chunk_time, rise.steps = seconds, rise.steps + chunk
-    rise.way += gone
     rise.load_time = rise.since + model.load_factor
-    rise.settlement = settlement_of(loads.direction, model.motion.x - reference)
-    rise.imbalance = imbalance(model)
-    if rise.load_time > point - 0.5 * dt:
+    # The rise is complete at its end: what is held then is what rose last.
+    if point < end and rise.load_time > point - 0.5 * dt:
         loads.begin(model, point)
         rise.begin(point)
-        return mean
+        return
     on = rise.load_time - rise.since
-    if rise.load_time >= rise.largest:
-        rise.largest, rise.way_there = rise.load_time, rise.way
+    rise.largest = max(rise.largest, rise.load_time)
+    if rise.load_time - rise.start > _HARDLY * (rise.reached - rise.start):
+        rise.reached, rise.way_there = rise.load_time, rise.way
     if on > _SET_IN * end:
-        rise.compliance = max(rise.compliance, rise.way / on)
+        rise.compliance = max(rise.compliance, (rise.way - rise.way_since) / on)
     if rise.compliance > 0.0:
         rise.speed = gone / seconds / rise.compliance
-        went_on = rise.way > (1.0 + control.beyond) * rise.way_there
-        rise.failed = (went_on and rise.load_time < rise.largest) or on <= 0.0
-    return mean
+        known = rise.largest - rise.since > _SET_IN * end
+        rise.failed = known and _went_on(rise, control)
+
+
+def hold_load(
+    model: BlockModel,
+    rise: Rise,
+    control: Control,
+    resistance: Resistance,
+    *,
+    steps: int,
+    direction: np.ndarray,
+    reference: np.ndarray,
+) -> None:
+    """A chunk of steps under the whole load, which brings `rise` and `resistance` up to date."""
+    gone, seconds = _advance(model, rise, resistance, steps, direction, reference)
+    rise.held += steps
+    if rise.compliance > 0.0:
+        rise.speed = gone / seconds / rise.compliance
+        rise.failed = _went_on(rise, control)
+
+
+def _advance(
+    model: BlockModel, rise: Rise, resistance: Resistance, steps: int, direction: np.ndarray, reference: np.ndarray
+) -> tuple[float, float]:
+    """Take steps; returns the way in them, and the seconds."""
+    way = model.way
+    model.advance(steps)
+    resistance.look(model)
+    rise.resisted += resistance.work
+    rise.steps += steps
+    rise.way += model.way - way
+    rise.settlement = settlement_of(direction, model.motion.x - reference)
+    rise.imbalance = imbalance(model)
+    return model.way - way, steps * model.dt
+
+
+def _went_on(rise: Rise, control: Control) -> bool:
+    """Whether the ground has gone further than it had at the largest load, by the share allowed."""
+    return rise.way > (1.0 + control.beyond) * rise.way_there
 
 
 def _rate(model: BlockModel, rise: Rise, control: Control, end: float) -> tuple[float, float]:
     """What the load grows by in a step, and by how much less per unit of its way."""
     dt = model.dt
-    if rise.compliance <= 0.0:
-        # A load that sets in at once makes the body swing.
-        return dt * min(1.0, 0.02 + 2.0 * (rise.load_time - rise.since) / (_SET_IN * end)), 0.0
+    set_in = (rise.largest - rise.since) / (_SET_IN * end)
+    if rise.compliance <= 0.0 or set_in <= 1.0:
+        # A load that sets in at once makes the body swing, and so does digging.
+        return dt * min(1.0, 0.02 + 2.0 * set_in), 0.0
     mobility = model.mobility()
     frame = control.frame
     if mobility > 0.0:
