@@ -127,6 +127,13 @@ class Load(Model):
         max_length=100_000,
     )
 
+    @property
+    def changes(self) -> bool:
+        """Whether it ever leaves its first pressure."""
+        if self.course is not None:
+            return any(pressure != self.course[0][1] for _, pressure in self.course)
+        return self.rate != 0.0
+
     @model_validator(mode="after")
     def _one_of_both(self) -> Load:
         faults = []
@@ -192,8 +199,9 @@ class Programme(Model):
     save_every: Time = key("4 s", "time of rise between saved states", gt=0)
     frame: Number = _knob(
         "programme.frame",
-        "stiffness of the frame that holds the loads, over that of the body: past the failure they fall with it",
-        ge=0.1,
+        "stiffness of the frame that holds the loads, over that of the body: past the failure they fall with it; 0: "
+        "dead loads, which run away with what fails",
+        ge=0,
         le=1e3,
     )
     beyond: Number = _knob(
@@ -203,11 +211,26 @@ class Programme(Model):
         le=100,
     )
     falling: Switch = key(False, "blocks may fall: the run goes on, and does not count it as failure")
+    bracket: Number | None = key(
+        None,
+        "width of a bracket, over the failure load: loads are held, and tried again with less where the body fails; "
+        "left out: they rise evenly, as if a stiff frame held them",
+        ge=1e-3,
+        le=1,
+    )
+    strength_reduction: Switch = key(
+        False, "strength falls instead of loads rising, until the body fails: the factor of safety, by a bracket"
+    )
 
     @model_validator(mode="after")
     def _something_holds(self) -> Programme:
-        if not self.supports:
-            raise ValueError("at least one support")
+        faults = [] if self.supports else ["at least one support"]
+        if self.excavations and (self.strength_reduction or self.bracket is not None):
+            faults.append("no excavations with a bracket or strength_reduction")
+        if self.strength_reduction and any(load.changes for load in self.loads):
+            faults.append("loads that do not change with strength_reduction")
+        if faults:
+            raise ValueError("; ".join(faults))
         return self
 
 

@@ -13,6 +13,7 @@ from graben.mechanics.blocks.loading import programme as mechanics
 from graben.mechanics.blocks.loading.courses import Course
 from graben.mechanics.blocks.loading.excavation import Dig, blocks_in
 from graben.mechanics.blocks.loading.failure import static_load
+from graben.mechanics.blocks.loading.holds import Holds
 from graben.mechanics.blocks.loading.loads import Loads, on_segment, pressure_forces, settlement_of
 from graben.mechanics.blocks.loading.rise import Control
 from graben.mechanics.blocks.record.history import History
@@ -22,8 +23,11 @@ from graben.stages.blocks.report import energy_error, energy_measure, kinetic_me
 from graben.stages.shared.measures import Measure, number
 
 
-def programme(scene: BlocksScene, model: BlockModel) -> mechanics.Programme:
-    """Supports are put on the model, and the test is made. BadInput where a segment is not on the outline."""
+def programme(scene: BlocksScene, model: BlockModel, steps: int) -> mechanics.Programme:
+    """Supports are put on the model, and the test is made. BadInput where a segment is not on the outline.
+
+    steps : of the whole rise
+    """
     assert scene.programme is not None
     p, b, file = scene.programme, model.bodies, str(scene.source.path)
     faults = []
@@ -50,16 +54,21 @@ def programme(scene: BlocksScene, model: BlockModel) -> mechanics.Programme:
             faults.append(Fault(file, f"programme.excavations.{k}", p.excavations[k].name, expected))
     if faults:
         raise BadInput(faults)
-    return mechanics.Programme(
-        model,
-        loads,
-        Control(p.frame, p.beyond),
-        end=p.end,
-        save_every=p.save_every,
-        tolerance=scene.numerics.consolidation_tolerance,
-        digs=digs,
-        may_fall=p.falling,
-    )
+    control = Control(p.frame, p.beyond)
+    options: dict[str, Any] = {
+        "end": p.end,
+        "save_every": p.save_every,
+        "tolerance": scene.numerics.consolidation_tolerance,
+        "may_fall": p.falling,
+    }
+    if p.bracket is None and not p.strength_reduction:
+        return mechanics.Programme(model, loads, control, digs=digs, **options)
+    width = _WIDTH if p.bracket is None else p.bracket
+    return Holds(model, loads, control, steps=steps, width=width, weaken=p.strength_reduction, **options)
+
+
+# Width of the bracket of a factor of safety, where the scene says nothing.
+_WIDTH = 0.02
 
 
 _FAILURE = (
@@ -135,6 +144,7 @@ class ProgrammeReport:
             "blocks": len(arrays["block_area"]),
             **({"blocks_removed": int(self.model.removed.sum())} if self.programme.excavations else {}),
             **self._failure(course),
+            **self._safety(),
             "failed": rise.failed,
             "at_rest": test.at_rest,
             "load_reached": test.reached,
@@ -167,6 +177,18 @@ class ProgrammeReport:
         over = abs(course.at(float(self.test.look_table()[self.test.first_look :, 0].max())) - load)
         shares = [number(v / abs(load)) if load else None for v in (abs(there - load), high - low, over)]
         return dict(zip(_FAILURE, (load, low, high, settlement, *shares), strict=True))
+
+    def _safety(self) -> dict[str, float | None]:
+        """Factor of safety with its bracket, where strength was reduced."""
+        if not isinstance(self.test, Holds) or not self.test.weaken:
+            return {}
+        found, test = self.test.failure(), self.test
+        names = ("factor_of_safety", "factor_of_safety_low", "factor_of_safety_high")
+        if found is not None:
+            return dict(zip(names, (found.load, found.low, found.high), strict=True))
+        # Failed with all its strength, or never.
+        ends = (None, test.low) if test.rise.failed else (test.low, None)
+        return dict(zip(names, (None, *ends), strict=True))
 
     def measures(self, headline: dict[str, Any]) -> list[Measure]:
         """Error measures with their thresholds."""

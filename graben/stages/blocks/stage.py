@@ -162,7 +162,7 @@ def _test(scene: BlocksScene, model: BlockModel, steps: int) -> tuple[Loading, R
     if scene.programme is None:
         compression = biaxial(scene, model, steps)
         return compression, BiaxialReport(scene, compression)
-    rising = programme(scene, model)
+    rising = programme(scene, model, steps)
     return rising, ProgrammeReport(scene, rising)
 
 

@@ -54,6 +54,21 @@ class Joint(NamedTuple):
         """Whether slip breaks it for good."""
         return self.residual_friction >= 0.0 or self.residual_cohesion >= 0.0
 
+    def weaker(self, factor: float) -> Joint:
+        """The same with its strength over a factor; a joint never dilates more than it rubs.
+
+        Residual values below 0, which stand for the others, stay below 0.
+        """
+        friction = self.friction / factor
+        return self._replace(
+            friction=friction,
+            cohesion=self.cohesion / factor,
+            tension=self.tension / factor,
+            dilation=min(self.dilation, friction),
+            residual_friction=self.residual_friction / factor,
+            residual_cohesion=self.residual_cohesion / factor,
+        )
+
     @property
     def stiffest(self) -> float:
         """Largest normal stiffness that it can have [Pa/m]."""

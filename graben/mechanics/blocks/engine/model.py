@@ -33,7 +33,8 @@ from graben.mechanics.blocks.engine.state import ModelState
 from graben.mechanics.blocks.engine.threads import run_together, share_out
 from graben.mechanics.blocks.shape.bodies import Bodies, chamfered_skin
 from graben.mechanics.blocks.shape.partition import cut_into_parts
-from graben.mechanics.blocks.zones.plastic import LOST, PlasticZones, Strength
+from graben.mechanics.blocks.zones.elastic import ElasticZones
+from graben.mechanics.blocks.zones.plastic import LOST, PlasticZones, Strength, plastic_zones
 from graben.mechanics.blocks.zones.rigid import RigidBlocks
 
 
@@ -84,9 +85,9 @@ class BlockModel(ModelState):
         strength: Strength | None = None,
         rigid: bool = False,
     ) -> None:
-        self.joints = (joint, *more_joints)
+        self.joints = self._given_joints = (joint, *more_joints)
         self.joint_table = joint_table(self.joints)
-        rock = setup.Rock(young, poisson, density, strength, rigid)
+        rock = self._rock = setup.Rock(young, poisson, density, strength, rigid)
         setup.refuse_unsound(rock, self.joints)
         self.damping = damping or Damping()
         made = setup.zones_and_masses(bodies, rock, self.joints, dt, self.damping.local)
@@ -240,6 +241,19 @@ class BlockModel(ModelState):
         self.held[vertices, axis] = True
         self.skeleton.wall[vertices, axis] = speed
         self.list_held()
+
+    def weaken(self, factor: float) -> None:
+        """Strength of joints and zones as given, over a factor: tan(friction), cohesion and tension.
+
+        Dilation stays, but for what exceeds the friction: such joints would give energy away.
+        """
+        self.joints = tuple(j.weaker(factor) for j in self._given_joints)
+        self.joint_table = joint_table(self.joints)
+        zones, strength = self.skeleton.zones, self._rock.strength
+        if isinstance(zones, PlasticZones) and strength is not None:
+            young, poisson = self._rock.young, self._rock.poisson
+            like = plastic_zones(ElasticZones(*zones[:5]), young, poisson, strength.weaker(factor))
+            self.skeleton = self.skeleton._replace(zones=zones._replace(par=like.par, bounds=like.bounds))
 
     def release(self, vertices: np.ndarray, axis: int) -> None:
         """Let vertices move freely along an axis again."""

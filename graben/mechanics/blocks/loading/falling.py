@@ -100,7 +100,7 @@ class Falling:
         share, centre, step = model.block_share(resisted), self._centres(model), model.steps_done
         keep = float(np.exp((self._looked - step) / _MEAN))
         self._resisted, self._looked = keep * self._resisted + (1.0 - keep) * resisted, step
-        mean = model.block_share(self._resisted)
+        mean = self.mean_share(model)
         *_, begins = (s.look(v, step) for s, v in zip(self._stretches, (share, share, mean, mean), strict=True))
         self._from[begins] = centre[begins]
         self._steady[self._stretches[2].below >= _LOOKS] = step
@@ -111,6 +111,10 @@ class Falling:
         if steady:
             gone |= self._creeps(centre, step)
         return self._fall(model, gone & (self._stretches[3].since >= 0))
+
+    def mean_share(self, model: BlockModel) -> np.ndarray:
+        """Shares (blocks,) of the forces on blocks that inertia and damping take up in the mean over some steps."""
+        return model.block_share(self._resisted)
 
     def fail(self, model: BlockModel) -> None:
         """The body as a whole has failed: blocks that are going with it have fallen."""

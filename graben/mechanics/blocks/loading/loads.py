@@ -46,6 +46,20 @@ class Loads:
             rising += course.slope(time) * force
         model.set_loads(steady, rising)
 
+    def stay(self, model: BlockModel, time: float) -> None:
+        """Set the model's loads to those of a time; they stay."""
+        model.set_loads(model.weight + self._at(time), np.zeros_like(model.weight))
+
+    def between(self, model: BlockModel, start: float, end: float, steps: int) -> None:
+        """Let the model's loads go from those of one time to those of another in so many steps."""
+        first = self._at(start)
+        model.set_loads(model.weight + first, self._at(end) - first)
+        model.set_load(0.0, 1.0 / steps)
+
+    def _at(self, time: float) -> np.ndarray:
+        """Sum of the loads (vertices, 2) at a time."""
+        return sum((course.at(time) * force for force, course in self.patterns), np.zeros_like(self.direction))
+
     def next_point(self, time: float) -> float:
         """Time of the next point of any course; infinite after the last."""
         return min((course.next_point(time) for _, course in self.patterns), default=float("inf"))

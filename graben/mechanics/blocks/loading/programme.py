@@ -23,11 +23,12 @@ from graben.mechanics.blocks.loading.resistance import Resistance
 from graben.mechanics.blocks.loading.rest import REST_DAMPING, imbalance, settle
 from graben.mechanics.blocks.loading.rise import Control, Rise, hold_load, raise_load
 
-# A block is at rest when its resultant is this share of the forces that bear on it.
-_BLOCK_REST = 0.02
+# A block is at rest when its resultant is this share of the forces that bear on it, and what inertia and damping take
+# up in the mean, without swings, is the second share.
+_BLOCK_REST, _CREEP_REST = 0.02, 5e-4
 
 # Steps between two looks at a body that is held, and the least number of steps after which it counts as restless.
-_HOLD, _RESTLESS = 100, 20_000
+HOLD, RESTLESS = 100, 20_000
 
 
 class Programme:
@@ -77,21 +78,34 @@ class Programme:
         m, ratio = self.model, np.inf
         where = "rest under weight and steady pressures"
         advice = "the body does not stand; strengthen the joints or support it"
-        for ratio in settle(m, self.tolerance, self._unrest, limit=100_000, where=where, advice=advice):
+        for ratio in settle(m, self.tolerance, self._settling, limit=100_000, where=where, advice=advice):
             yield Moment(0.0, f"coming to rest, {m.steps_done} steps, unbalanced force ratio {ratio:.2g}")
-            self.resistance.look(m)
-            if self.falling.look(m, self.resistance.force, steady=True) and not self.may_fall:
+            if len(self.falling.blocks) and not self.may_fall:
                 self.rise.failed = self.rise.fell = True
                 break
         self.rest = np.array([ratio, m.steps_done])
         self.reference = m.motion.x.copy()
         self.carried = self.reference
 
+    def _settling(self, model: BlockModel) -> float:
+        """`_unrest` while the body comes to rest, with a look at what falls."""
+        self.resistance.look(model)
+        self.falling.look(model, self.resistance.force, steady=True)
+        return self._unrest(model)
+
     def _unrest(self, model: BlockModel) -> float:
-        """Imbalance of the whole, and of the block that is worst: it must not be diluted by the others."""
-        blocks = model.block_imbalance()
-        blocks[self.falling.blocks] = 0.0
-        return max(imbalance(model), self.tolerance * float(blocks.max()) / _BLOCK_REST)
+        """Imbalance of the whole, and of the block that is worst: it must not be diluted by the others.
+
+        Nor may a block creep on, whose friction takes up nearly all that moves it.
+        """
+        blocks, creep = model.block_imbalance(), self.falling.mean_share(model)
+        for share in (blocks, creep):
+            share[self.falling.blocks] = 0.0
+        return max(
+            imbalance(model),
+            self.tolerance * float(blocks.max()) / _BLOCK_REST,
+            self.tolerance * float(creep.max()) / _CREEP_REST,
+        )
 
     def run(self) -> Iterator[Moment]:
         """Raise the loads and dig until failure or the end."""
@@ -123,10 +137,10 @@ class Programme:
             rise.load_time = self.end
         self.at_rest = False
         m.damp(REST_DAMPING)
-        while not rise.failed and not self.at_rest and rise.held < max(_RESTLESS, rise.steps - rise.held):
+        while not rise.failed and not self.at_rest and rise.held < max(RESTLESS, rise.steps - rise.held):
             hold_load(
                 m, rise, self.control, self.resistance,
-                steps=_HOLD, direction=self.loads.direction, reference=self.reference,
+                steps=HOLD, direction=self.loads.direction, reference=self.reference,
             )  # fmt: skip
             self._look(steady=True)
             ratio = self._unrest(m)
@@ -157,6 +171,7 @@ class Programme:
             rise.failed = rise.fell = True
         elif rise.failed:
             self.falling.fail(model)
+        self.resistance.counted = (self.falling.fallen[:, 3] < 0)[model.bodies.vertex_block]
 
     def look_table(self) -> np.ndarray:
         """The looks as rows (looks, 6)."""

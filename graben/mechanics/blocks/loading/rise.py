@@ -34,7 +34,7 @@ _STABLE = 0.25
 
 @dataclass(frozen=True)
 class Control:
-    """frame : stiffness of the frame over that of the body
+    """frame : stiffness of the frame over that of the body; 0: dead loads
 
     beyond : the test ends when the ground has gone this much further than at the largest load, over its way there
     patience : most steps, over those of an even rise

@@ -33,6 +33,11 @@ class Strength(NamedTuple):
     tension: float
     dilation: float = 0.0
 
+    def weaker(self, factor: float) -> Strength:
+        """The same with tan(friction), cohesion and tension over a factor; dilation stays at most friction."""
+        friction = float(np.arctan(np.tan(self.friction) / factor))
+        return Strength(friction, self.cohesion / factor, self.tension / factor, min(self.dilation, friction))
+
 
 class PlasticZones(NamedTuple):
     """Zones that yield: as ElasticZones, then par of the law, its bounds (`limits`), and what each zone keeps.

@@ -1,0 +1,175 @@
+"""Brackets: a load, or a loss of strength, is held until the body rests or fails; a failure is tried again with less.
+
+Each try begins at the largest load at which the body was at rest, so that both ends of the bracket are seen: the body
+rests at the lower one, and from there it does not at the upper one. What holds is dead weight, so nothing here
+depends on how a failure is driven. The price is a rest for each try.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from graben.errors import Refused
+from graben.mechanics.blocks.loading.failure import Failure
+from graben.mechanics.blocks.loading.programme import HOLD, RESTLESS, Programme
+from graben.mechanics.blocks.loading.protocol import Moment, State
+from graben.mechanics.blocks.loading.rest import REST_DAMPING
+from graben.mechanics.blocks.loading.rise import hold_load
+from graben.mechanics.blocks.record import snapshot
+
+# A first step, over the whole rise; steps that it takes at least, and steps of rest after it; tries at most.
+_FIRST, _LEAST, _STILL, _TRIES = 0.1, 500, 2000, 60
+
+# Strength is reduced from what holds more or less everything, by factors, up to what holds next to nothing.
+_STRONG, _FACTOR, _WEAK = 0.125, 1.5, 20.0
+
+
+class Holds(Programme):
+    """A `Programme` whose loads are held between steps, and bracketed.
+
+    steps : of the whole rise; width : of the bracket wanted, over the load
+    weaken : strength is reduced instead, by a factor that takes the place of the load time; the loads stay
+    low, high : the bracket [s, or the factor]; tried : whether the upper end was tried from the lower one
+    """
+
+    def __init__(self, *arguments: Any, steps: int, width: float, weaken: bool = False, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.steps, self.width, self.weaken = steps, width, weaken
+        self.low, self.high, self.tried = (_STRONG if weaken else 0.0), np.inf, False
+        self.last = _WEAK if weaken else self.end
+        if weaken:
+            self.model.weaken(self.low)
+
+    def run(self) -> Iterator[Moment]:
+        """Find the bracket; the last saved state is the failure from its lower end, where there is one."""
+        m = self.model
+        if not self.load_times:
+            m.begin_ledger()
+            self.rise.load_time = self.low
+            yield self._moment(save=True)
+        if self.rise.failed:
+            return
+        kept = self._kept()
+        for n in range(_TRIES):
+            target = self._next()
+            yield from self._try(target, n)
+            if self.at_rest:
+                self.low, self.tried = target, False
+                self.carried = m.motion.x.copy()
+                if self.low >= self.last:
+                    break
+                kept = self._kept()
+                yield self._moment(save=True)
+                continue
+            self.high, self.tried = target, True
+            if self.narrow:
+                self.rise.failed = True
+                break
+            self._bring(kept)
+        if m.time > self._saved_at:
+            yield self._moment(save=True)
+
+    @property
+    def narrow(self) -> bool:
+        """Whether the bracket is as narrow as wanted."""
+        return self.high - self.low <= self.width * 0.5 * (self.high + self.low)
+
+    def _next(self) -> float:
+        """What is tried next: further up, between, or the upper end once more, from a new lower one."""
+        if np.isinf(self.high):
+            further = self.low * _FACTOR if self.weaken else self.low + _FIRST * self.end
+            return min(further, self.last)
+        if self.narrow and not self.tried:
+            return self.high
+        return 0.5 * (self.low + self.high)
+
+    def _try(self, target: float, n: int) -> Iterator[Moment]:
+        """Go there from where the body rests, and hold."""
+        m, rise, start = self.model, self.rise, self.rise.load_time
+        self.at_rest = False
+        share = _FIRST if self.weaken else (target - start) / self.end
+        chunks = max(_LEAST, round(share * self.steps)) // HOLD + 1
+        fallen = len(self.falling.blocks)
+
+        def fell() -> bool:
+            return not self.may_fall and len(self.falling.blocks) > fallen
+
+        for k in range(chunks):
+            self._load((k + 1) / chunks, start, target)
+            self._advance(steady=False)
+            yield Moment(min(1.0, n / 20), f"at {rise.load_time:.4g}, going to {target:.4g}")
+            if fell():
+                return
+        damping, held = m.damping, 0
+        m.damp(REST_DAMPING)
+        while not self.at_rest and not fell() and held < max(RESTLESS, self.steps):
+            self._advance(steady=True)
+            held += HOLD
+            ratio = self._unrest(m)
+            self.at_rest = held >= _STILL and ratio < self.tolerance and not fell()
+            yield Moment(min(1.0, n / 20), f"at {target:.4g}, {held} steps, unbalanced force ratio {ratio:.2g}")
+        m.damp(damping)
+
+    def _load(self, share: float, start: float, target: float) -> None:
+        """Loads, or strength, at a share of the way from start to target; loads get there by even steps."""
+        before, self.rise.load_time = self.rise.load_time, start + share * (target - start)
+        if self.weaken:
+            self.model.weaken(self.rise.load_time)
+        else:
+            self.loads.between(self.model, before, self.rise.load_time, HOLD)
+
+    def _advance(self, steady: bool) -> None:
+        hold_load(
+            self.model, self.rise, self.control, self.resistance,
+            steps=HOLD, direction=self.loads.direction, reference=self.reference,
+        )  # fmt: skip
+        if not self.weaken:
+            self.loads.stay(self.model, self.rise.load_time)
+        self._look(steady=steady)
+
+    def _look(self, *, steady: bool = False) -> None:
+        super()._look(steady=steady)
+        # Whether a try failed is known at its end.
+        self.rise.failed = self.rise.fell = False
+
+    def failure(self) -> Failure | None:
+        """The bracket, and its middle."""
+        if not self.rise.failed or np.isinf(self.high):
+            return None
+        look = int(np.searchsorted(np.maximum.accumulate(self.look_table()[:, 0]), self.low))
+        return Failure(0.5 * (self.low + self.high), self.low, self.high, min(look, len(self.looks) - 1))
+
+    @property
+    def reached(self) -> float | None:
+        """Share of the rise at which the body rested; None where strength is reduced."""
+        return None if self.weaken else min(1.0, self.low / self.end)
+
+    def _kept(self) -> tuple[State, State]:
+        return snapshot.take(self.model), self.state()
+
+    def _bring(self, kept: tuple[State, State]) -> None:
+        """Back to where the body rested."""
+        snapshot.bring_back(self.model, {name: values.copy() for name, values in kept[0].items()})
+        looks, saved, moments = self.looks, self._saved_at, self.load_times
+        super().bring_back({name: np.array(values) for name, values in kept[1].items()})
+        self.looks, self._saved_at, self.load_times = looks, saved, moments
+        if self.weaken:
+            self.model.weaken(self.low)
+        else:
+            self.loads.stay(self.model, self.low)
+
+    def state(self) -> State:
+        bracket = {"low": self.low, "high": self.high, "tried": self.tried}
+        return super().state() | {f"bracket_{name}": np.array(value) for name, value in bracket.items()}
+
+    def bring_back(self, state: State) -> None:
+        super().bring_back(state)
+        self.low, self.high = float(state["bracket_low"]), float(state["bracket_high"])
+        self.tried = bool(state["bracket_tried"])
+        if not 0.0 <= self.low <= self.high:
+            raise Refused("test.bracket_low: at most test.bracket_high")
+        if self.weaken:
+            self.model.weaken(max(self.low, _STRONG))
