@@ -45,6 +45,12 @@ UPSCALING = [
         "failure_load_pa"),
     Row("slope: lowest load in the band", "Pa", "slope-band", "failure_load_low_pa", "", "failure_load_low_pa"),
     Row("slope: highest load in the band", "Pa", "slope-band", "failure_load_high_pa", "", "failure_load_high_pa"),
+    Row("slope by blocks: failure load", "Pa", "slope-blocks", "failure_load_pa", "Y: 11.2 MPa (UDEC, dead load)",
+        "blocks_failure_load_pa"),
+    Row("slope by blocks: lower end of its interval", "Pa", "slope-blocks", "failure_load_low_pa", "",
+        "blocks_failure_load_low_pa"),
+    Row("slope by blocks: upper end", "Pa", "slope-blocks", "failure_load_high_pa", "",
+        "blocks_failure_load_high_pa"),
     Row("slope: settlement under the load", "m", "slope", "settlement_m", "Y: 130 to 220 mm (read off a figure)"),
 ]  # fmt: skip
 WEAR = [

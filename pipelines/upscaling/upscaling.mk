@@ -12,8 +12,13 @@ UP_CURVES    := $(CONFINING:%=$(UP)/curves-%MPa.nc)
 UP_SEEDS     ?= 2 3
 UP_REV_RUNS  := $(firstword $(UP_RUNS)) $(UP_SEEDS:%=$(UP)/blocks-seed%.nc)
 UP_PICTURES  := $(UP)/blocks-$(firstword $(CONFINING))MPa.png $(UP)/rev-study.png \
-                $(UP)/calibration.png $(UP)/calibration-udec.png $(UP)/slope.png
-UP_ARTIFACTS := $(UP_RUNS) $(UP_CURVES) $(UP)/rev-study.nc $(UP)/calibration.nc $(UP)/calibration-udec.nc $(UP)/slope.nc
+                $(UP)/calibration.png $(UP)/calibration-udec.png $(UP)/slope.png $(UP)/slope-blocks.png \
+                $(UP)/slope-compared.png
+UP_ARTIFACTS := $(UP_RUNS) $(UP_CURVES) $(UP)/rev-study.nc $(UP)/calibration.nc $(UP)/calibration-udec.nc \
+                $(UP)/slope.nc $(UP)/slope-blocks.nc
+# A draft takes blocks of twice the size: a minute instead of ten.
+COARSE       := --set 'tessellation.edge="1 m"' --set 'tessellation.shortest_edge="0.48 m"' \
+                --set 'tessellation.rounding="0.1 m"'
 
 .PHONY: upscaling
 upscaling: $(UP)/summary.json $(UP_PICTURES) ## the up-scaling chain: blocks, averages, law, slope
@@ -53,6 +58,20 @@ $(UP)/calibration-udec.nc: $(UP_SCENES)/calibrate-udec.toml $(UP_SCENES)/referen
 
 $(UP)/slope.nc: $(UP_SCENES)/slope.toml $(UP)/calibration.nc
 	$(call stage,fem-run $< --material $(UP)/calibration.material.toml --set fidelity=$(FIDELITY))
+
+$(UP)/slope-blocks.nc: $(UP_SCENES)/slope-blocks.toml $(UP)/.fidelity | $(READY)
+	$(call stage,dem-run $< --set fidelity=$(FIDELITY) $(if $(filter draft,$(FIDELITY)),$(COARSE)))
+
+$(UP)/slope-compared.png: $(UP_SCENES)/slope_compare.py $(UP)/slope-blocks.nc $(UP)/slope.nc $(UP)/slope-band.json
+	$(BIN)/python $< $(UP)/slope-blocks.nc --continuum $(UP)/slope.nc --band $(UP)/slope-band.json -o $@
+
+# The reference that fem-run is judged against: all 12,360 blocks.
+$(RESULTS)/verify/slope.nc: $(UP_SCENES)/slope-blocks.toml | $(READY)
+	$(call stage,dem-run $< --set numerics.threads=$(JOBS))
+
+.PHONY: slope
+slope: $(RESULTS)/verify/slope.nc ## the slope of 12,360 blocks and its failure load (7 CPU minutes); results/verify/slope.json
+	$(BIN)/python $(UP_SCENES)/slope_compare.py $< -o $(<:.nc=.png)
 
 $(UP)/slope-band.json: $(UP_SCENES)/slope_band.py $(UP)/slope.nc
 	$(BIN)/python $< $(UP)/calibration.nc $(UP_SCENES)/slope.toml --own $(UP)/slope.json --fidelity $(FIDELITY) -o $@

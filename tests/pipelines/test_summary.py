@@ -26,6 +26,7 @@ def test_a_chain_is_told_with_its_published_numbers_and_warnings(tmp_path, capsy
                         "warnings": ["poisson_ratio: widen it in [free]"]},
         "calibration-udec": {"rmse_pa": 5.9e5},
         "slope": {"failure_load_pa": None, "settlement_m": 0.2},
+        "slope-blocks": {"failure_load_pa": 9.3e6, "failure_load_low_pa": 9.1e6, "failure_load_high_pa": 9.5e6},
         "slope-band": {"failure_load_low_pa": 1e7, "failure_load_high_pa": 1.3e7},
         "curves-4MPa": {"paths": [{"confining_stress_pa": -4e6, "peak_stress_pa": 3.5e7}]},
     }  # fmt: skip
@@ -40,6 +41,7 @@ def test_a_chain_is_told_with_its_published_numbers_and_warnings(tmp_path, capsy
     assert (
         told["failure_load_pa"] is None
         and told["udec_rmse_pa"] == 5.9e5
+        and told["blocks_failure_load_low_pa"] == 9.1e6
         and told["parameters"]["poisson_ratio"] == 0.2
     )
     summary.table(tmp_path)
@@ -47,6 +49,7 @@ def test_a_chain_is_told_with_its_published_numbers_and_warnings(tmp_path, capsy
     # The peak of the curves in the repository at 4 MPa.
     for words in (
         "35 MPa",
+        "9.3 MPa",
         "UDEC: 38.1 MPa",
         "2 GPa",
         "Y: 1.03 MPa",

@@ -60,6 +60,7 @@ def programme(scene: BlocksScene, model: BlockModel, steps: int) -> mechanics.Pr
         "save_every": p.save_every,
         "tolerance": scene.numerics.consolidation_tolerance,
         "may_fall": p.falling,
+        **({"set_in": 0} if scene.in_situ is not None else {}),
     }
     if p.bracket is None and not p.strength_reduction:
         return mechanics.Programme(model, loads, control, digs=digs, **options)

@@ -175,6 +175,11 @@ def test_a_body_that_does_not_stand_is_a_failure_of_the_run(scene):
         ('programme.loads=[{start=["5 m","4 m"],end=["6 m","4 m"]}]', "outline"),
         ('programme.supports=[{start=["5 m","4 m"],end=["6 m","4 m"]}]', "outline"),
         ("programme.supports=[]", "support"),
+        ("programme.strength_reduction=true", "do not change"),
+        (
+            'programme={bracket=0.1,excavations=[{polygon=[["4 m","1 m"],["5 m","1 m"],["5 m","2 m"]]}]}',
+            "no excavations with a bracket",
+        ),
         ("numerics.stop_loose_blocks=true", "stop_loose_blocks"),
         ('loading.speed="1 mm/s"', "either"),
         ('domain.outline=[["0 m","0 m"],["8 m","5 m"],["8 m","0 m"],["0 m","5 m"]]', "cross"),
@@ -184,3 +189,23 @@ def test_bad_programmes_are_refused(scene, setting, word):
     with pytest.raises(BadInput) as refused:
         dem_run.run(scene, scene.with_name("never.nc"), overrides=[setting])
     assert any(word in str(f) for f in refused.value.faults)
+
+
+def test_loads_and_strength_are_bracketed(scene):
+    output = scene.with_name("bracket.nc")
+    headline = dem_run.run(scene, output, overrides=["programme.bracket=0.2", "programme.falling=false"])
+    low, load, high = (headline[f"failure_load_{name}pa"] for name in ("low_", "", "high_"))
+    assert headline["failed"] and 0.0 < low < load < high < 1.3 * low
+    assert "factor_of_safety" not in headline
+    assert check_artifact(output) == []
+    dead = ['programme.loads=[{start=["5.1 m","5 m"],end=["6.1 m","5 m"],pressure="1 MPa"}]']
+    safety = dem_run.run(
+        scene,
+        scene.with_name("safety.nc"),
+        overrides=[*dead, "programme.strength_reduction=true", "programme.bracket=0.2"],
+    )
+    assert safety["failed"] and safety["failure_load_pa"] is None
+    assert 1.0 < safety["factor_of_safety_low"] < safety["factor_of_safety"] < safety["factor_of_safety_high"]
+    assert check_artifact(scene.with_name("safety.nc")) == []
+    with xarray.open_dataset(scene.with_name("safety.nc")) as dataset:
+        assert dataset["load_time"].values[-1] == pytest.approx(safety["factor_of_safety_high"])

@@ -33,13 +33,14 @@ class Holds(Programme):
     steps : of the whole rise; width : of the bracket wanted, over the load
     weaken : strength is reduced instead, by a factor that takes the place of the load time; the loads stay
     low, high : the bracket [s, or the factor]; tried : whether the upper end was tried from the lower one
+    tries : how many have been made
     """
 
     def __init__(self, *arguments: Any, steps: int, width: float, weaken: bool = False, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.steps, self.width, self.weaken = steps, width, weaken
         self.low, self.high, self.tried = (_STRONG if weaken else 0.0), np.inf, False
-        self.last = _WEAK if weaken else self.end
+        self.last, self.tries = (_WEAK if weaken else self.end), 0
         if weaken:
             self.model.weaken(self.low)
 
@@ -53,9 +54,10 @@ class Holds(Programme):
         if self.rise.failed:
             return
         kept = self._kept()
-        for n in range(_TRIES):
+        while self.tries < _TRIES:
             target = self._next()
-            yield from self._try(target, n)
+            yield from self._try(target)
+            self.tries += 1
             if self.at_rest:
                 self.low, self.tried = target, False
                 self.carried = m.motion.x.copy()
@@ -86,7 +88,11 @@ class Holds(Programme):
             return self.high
         return 0.5 * (self.low + self.high)
 
-    def _try(self, target: float, n: int) -> Iterator[Moment]:
+    def _moment(self, save: bool) -> Moment:
+        # Nobody knows how many tries it takes: about twenty.
+        return super()._moment(save)._replace(fraction=min(1.0, self.tries / 20))
+
+    def _try(self, target: float) -> Iterator[Moment]:
         """Go there from where the body rests, and hold."""
         m, rise, start = self.model, self.rise, self.rise.load_time
         self.at_rest = False
@@ -100,7 +106,8 @@ class Holds(Programme):
         for k in range(chunks):
             self._load((k + 1) / chunks, start, target)
             self._advance(steady=False)
-            yield Moment(min(1.0, n / 20), f"at {rise.load_time:.4g}, going to {target:.4g}")
+            words = f"at {rise.load_time:.4g}, going to {target:.4g}"
+            yield self._moment(save=False)._replace(words=words)
             if fell():
                 return
         damping, held = m.damping, 0
@@ -110,7 +117,8 @@ class Holds(Programme):
             held += HOLD
             ratio = self._unrest(m)
             self.at_rest = held >= _STILL and ratio < self.tolerance and not fell()
-            yield Moment(min(1.0, n / 20), f"at {target:.4g}, {held} steps, unbalanced force ratio {ratio:.2g}")
+            words = f"at {target:.4g}, {held} steps, unbalanced force ratio {ratio:.2g}"
+            yield self._moment(save=False)._replace(words=words)
         m.damp(damping)
 
     def _load(self, share: float, start: float, target: float) -> None:
@@ -162,13 +170,13 @@ class Holds(Programme):
             self.loads.stay(self.model, self.low)
 
     def state(self) -> State:
-        bracket = {"low": self.low, "high": self.high, "tried": self.tried}
+        bracket = {"low": self.low, "high": self.high, "tried": self.tried, "tries": self.tries}
         return super().state() | {f"bracket_{name}": np.array(value) for name, value in bracket.items()}
 
     def bring_back(self, state: State) -> None:
         super().bring_back(state)
         self.low, self.high = float(state["bracket_low"]), float(state["bracket_high"])
-        self.tried = bool(state["bracket_tried"])
+        self.tried, self.tries = bool(state["bracket_tried"]), int(state["bracket_tries"])
         if not 0.0 <= self.low <= self.high:
             raise Refused("test.bracket_low: at most test.bracket_high")
         if self.weaken:

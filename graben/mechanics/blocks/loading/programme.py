@@ -37,6 +37,7 @@ class Programme:
     end : load time at which the rise is complete, save_every : load time between saved states [s]
     tolerance : of `imbalance` at rest
     may_fall : whether blocks may fall without ending the test
+    set_in : steps over which weight and steady pressures grow at first; 0: they are there, as stress in situ wants
     looks : (load time [s], settlement [m], imbalance, way, resisted, step) after every chunk, see `Rise`;
     load_times : of saved states [s]; first_look : the first since rates of loads last changed
     reference : (vertices, 2) positions at rest, carried : at the largest load [m]
@@ -54,11 +55,12 @@ class Programme:
         tolerance: float,
         digs: Sequence[Dig] = (),
         may_fall: bool = False,
+        set_in: int = 2000,
     ) -> None:
         self.model, self.loads, self.control = model, loads, control
         self.end, self.save_every, self.tolerance = end, save_every, tolerance
         self.rise, self.falling, self.may_fall = Rise(), Falling(model), may_fall
-        self.resistance = Resistance(model)
+        self.resistance, self.set_in = Resistance(model), set_in
         self.at_rest: bool | None = None
         self.looks: list[tuple[float, ...]] = []
         self.first_look = 0
@@ -76,6 +78,7 @@ class Programme:
     def begin(self) -> Iterator[Moment]:
         """Bring the body to rest under its weight and steady pressures."""
         m, ratio = self.model, np.inf
+        yield from self._set_in()
         where = "rest under weight and steady pressures"
         advice = "the body does not stand; strengthen the joints or support it"
         for ratio in settle(m, self.tolerance, self._settling, limit=100_000, where=where, advice=advice):
@@ -86,6 +89,23 @@ class Programme:
         self.rest = np.array([ratio, m.steps_done])
         self.reference = m.motion.x.copy()
         self.carried = self.reference
+
+    def _set_in(self) -> Iterator[Moment]:
+        """Let weight and steady pressures grow: what acts at once makes the body swing, and slender blocks fall."""
+        m = self.model
+        if not self.set_in:
+            return
+        steady = m.skeleton.steady.copy()
+        m.set_loads(np.zeros_like(steady), steady)
+        m.set_load(0.0, 1.0 / self.set_in)
+        damping = m.damping
+        m.damp(REST_DAMPING)
+        for done in range(0, self.set_in, HOLD):
+            m.advance(min(HOLD, self.set_in - done))
+            self.resistance.look(m)
+            yield Moment(0.0, f"weight and steady pressures set in, {m.steps_done} steps")
+        m.damp(damping)
+        self.loads.begin(m, 0.0)
 
     def _settling(self, model: BlockModel) -> float:
         """`_unrest` while the body comes to rest, with a look at what falls."""

@@ -9,6 +9,7 @@ from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.biaxial import Biaxial, Courses
 from graben.mechanics.blocks.loading.courses import Course
 from graben.mechanics.blocks.loading.excavation import Dig
+from graben.mechanics.blocks.loading.holds import Holds
 from graben.mechanics.blocks.loading.loads import Loads, on_segment, pressure_forces
 from graben.mechanics.blocks.loading.pace import ForceCheck
 from graben.mechanics.blocks.loading.programme import Control, Programme
@@ -51,6 +52,17 @@ def dug():
     return Programme(model, loads, Control(), end=8.0, save_every=2.0, tolerance=1e-2, digs=digs)
 
 
+def bracketed():
+    model = blocks(gravity=-9.81)
+    base = on_segment(model.bodies, SQUARE[0], SQUARE[1])
+    for axis in (0, 1):
+        model.hold(base, axis)
+    loads = Loads(len(base))
+    loads.add(pressure_forces(model.bodies, SQUARE[2], SQUARE[3]), Course([(0.0, 1e5)], 1e6))
+    options = {"end": 8.0, "save_every": 2.0, "tolerance": 1e-2, "steps": 800, "width": 0.2}
+    return Holds(model, loads, Control(), **options)
+
+
 def kept(test):
     return {**snapshot.take(test.model), **{f"test.{k}": np.array(v) for k, v in test.state().items()}}
 
@@ -60,7 +72,7 @@ def end_of(test):
     return [(moment, kept(test) if moment.save else None) for moment in test.run()]
 
 
-@pytest.mark.parametrize("make", [steady, paced, dug])
+@pytest.mark.parametrize("make", [steady, paced, dug, bracketed])
 def test_a_test_goes_on_bitwise_from_every_saved_moment(make):
     straight = make()
     for moment in straight.begin():
