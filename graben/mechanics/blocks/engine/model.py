@@ -307,10 +307,10 @@ class BlockModel(ModelState):
         np.add.at(target, c, half)
 
     def set_loads(self, steady: np.ndarray, rising: np.ndarray) -> None:
-        """Dead loads (vertices, 2) [N/m] instead of those before: steady ones with the weight, and rising ones from
-        a factor of 0 on."""
+        """Dead loads (vertices, 2) [N/m] instead of those before: steady ones with the weight, and rising ones that
+        stay at a factor of 0."""
         self.skeleton.steady[:], self.skeleton.rising[:] = steady, rising
-        self.motion.drive[LOAD] = 0.0
+        self.set_load(0.0)
 
     def take_off_steady(self, vertices: np.ndarray, axis: int) -> None:
         """No steady load but the weight acts on vertices (indices or mask) along an axis."""

@@ -147,6 +147,20 @@ def test_a_whole_load_is_held_until_the_body_rests_or_fails(share, falls):
         assert imbalance(model) < 1e-3
 
 
+def test_no_load_rises_before_the_body_is_at_rest():
+    end = 40.0
+    shapes = [rectangle(0, -0.5, 2, 0), rectangle(0, 0, 2, 1)]
+    model = standing(shapes, rectangle(0, -0.5, 2, 1), friction=20.0, end=end, steps=5000)
+    loads = Loads(len(model.bodies.position))
+    loads.add(pressure_forces(model.bodies, (0, 1), (2, 1)), Course([(0.0, 1e3)], 1e5))
+    test = Programme(model, loads, Control(), end=end, save_every=end, tolerance=1e-3)
+    for _ in test.begin():
+        pass
+    assert model.load_factor == 0.0
+    weight = RHO * G * 3.0
+    assert model.boundary_force()[model.held.any(axis=1), 1].sum() == pytest.approx(weight + 2e3, rel=1e-3)
+
+
 def test_a_block_that_creeps_under_a_steady_load_has_fallen():
     shapes = [rectangle(0, -0.5, 2, 0), rectangle(0, 0, 2, 1)]
     model = standing(shapes, rectangle(0, -0.5, 2, 1), friction=20.0, end=40.0, steps=10_000)
