@@ -58,7 +58,8 @@ def vtu_bytes(
     grid = pyvista.UnstructuredGrid(np.concatenate(connectivity), np.concatenate(kinds), _three(points))
     for name, values in (point_data or {}).items():
         grid.point_data[name] = _three(values) if _is_plane_vector(values) else np.asarray(values)
-    for name, values in (cell_data or {}).items():
+    # A grid without cells, such as the contacts of blocks that all fell, has no data either.
+    for name, values in (cell_data or {}).items() if grid.n_cells else ():
         grid.cell_data[name] = _three(values) if _is_plane_vector(values) else np.asarray(values)
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetInputData(grid)

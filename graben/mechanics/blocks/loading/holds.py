@@ -60,6 +60,9 @@ class Holds(Programme):
             self.tries += 1
             if self.at_rest:
                 self.low, self.tried = target, False
+                if target >= self.high:
+                    # From nearer by the body bears what it did not before: the search goes up again.
+                    self.high = np.inf
                 self.carried = m.motion.x.copy()
                 if self.low >= self.last:
                     break
