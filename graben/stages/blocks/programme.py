@@ -174,6 +174,9 @@ class ProgrammeReport:
         settlement = self.test.looks[found.look][1]
         load, there = course.at(found.load), course.at(found.load + found.inertia)
         low, high = sorted((course.at(found.low), course.at(found.high)))
+        if isinstance(self.test, Holds):
+            # A bracket may close around a jump.
+            load = there = 0.5 * (low + high)
         low, high = low - _REPEATS * abs(load), high + _REPEATS * abs(load)
         over = abs(course.at(float(self.test.look_table()[self.test.first_look :, 0].max())) - load)
         shares = [number(v / abs(load)) if load else None for v in (abs(there - load), high - low, over)]
@@ -186,7 +189,8 @@ class ProgrammeReport:
         found, test = self.test.failure(), self.test
         names = ("factor_of_safety", "factor_of_safety_low", "factor_of_safety_high")
         if found is not None:
-            return dict(zip(names, (found.load, found.low, found.high), strict=True))
+            low, high = (1.0 - _REPEATS) * found.low, (1.0 + _REPEATS) * found.high
+            return dict(zip(names, (found.load, low, high), strict=True))
         # Failed with all its strength, or never.
         ends = (None, test.low) if test.rise.failed else (test.low, None)
         return dict(zip(names, (None, *ends), strict=True))

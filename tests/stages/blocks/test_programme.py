@@ -38,7 +38,7 @@ fix = "y"
 [[programme.loads]]
 start = ["5.1 m","5 m"]
 end = ["6.1 m","5 m"]
-rate = "0.4 MPa/s"
+rate = "0.25 MPa/s"
 """
 
 
@@ -67,11 +67,11 @@ def test_a_loaded_slope_fails_after_it_stood(finished):
     assert check_artifact(output) == []
     assert headline["failed"]
     assert (
-        1e6 < headline["failure_load_low_pa"] < headline["failure_load_pa"] < headline["failure_load_high_pa"] < 40e6
+        1e6 < headline["failure_load_low_pa"] < headline["failure_load_pa"] < headline["failure_load_high_pa"] < 25e6
     )
     assert headline["failure_load_pa"] < headline["largest_load_pa"] < headline["failure_load_high_pa"]
     assert headline["true_time_s"] > 0.0
-    assert headline["failure_settlement_m"] > 0.0 and headline["settlement_m"] > 0.0
+    assert 0.0 < headline["failure_settlement_m"] <= headline["settlement_m"] * 1.5
     assert headline["energy_error"] < 0.05
     d = read_artifact(output, "blocks")
     # The base and the weight at the first state, then the load as well.
@@ -210,4 +210,4 @@ def test_loads_and_strength_are_bracketed(scene):
     assert 1.0 < safety["factor_of_safety_low"] < safety["factor_of_safety"] < safety["factor_of_safety_high"]
     assert check_artifact(scene.with_name("safety.nc")) == []
     with xarray.open_dataset(scene.with_name("safety.nc")) as dataset:
-        assert dataset["load_time"].values[-1] == pytest.approx(safety["factor_of_safety_high"])
+        assert safety["factor_of_safety"] < dataset["load_time"].values[-1] < safety["factor_of_safety_high"]

@@ -86,6 +86,7 @@ class BlockModel(ModelState):
         rigid: bool = False,
     ) -> None:
         self.joints = self._given_joints = (joint, *more_joints)
+        self._factor, self._spared = 1.0, False
         self.joint_table = joint_table(self.joints)
         rock = self._rock = setup.Rock(young, poisson, density, strength, rigid)
         setup.refuse_unsound(rock, self.joints)
@@ -247,13 +248,28 @@ class BlockModel(ModelState):
 
         Dilation stays, but for what exceeds the friction: such joints would give energy away.
         """
-        self.joints = tuple(j.weaker(factor) for j in self._given_joints)
-        self.joint_table = joint_table(self.joints)
+        self._factor = factor
+        self._set_joints()
         zones, strength = self.skeleton.zones, self._rock.strength
         if isinstance(zones, PlasticZones) and strength is not None:
             young, poisson = self._rock.young, self._rock.poisson
             like = plastic_zones(ElasticZones(*zones[:5]), young, poisson, strength.weaker(factor))
             self.skeleton = self.skeleton._replace(zones=zones._replace(par=like.par, bounds=like.bounds))
+
+    def spare_joints(self, spared: bool) -> None:
+        """While spared, joints keep their first strength: they weaken from the first state on.
+
+        A body that is put under its loads has joints without stress, which any force would break.
+        """
+        self._spared = spared
+        self._set_joints()
+
+    def _set_joints(self) -> None:
+        joints = [j.weaker(self._factor) for j in self._given_joints]
+        if self._spared:
+            joints = [j._replace(residual_friction=-1.0, residual_cohesion=-1.0) for j in joints]
+        self.joints = tuple(joints)
+        self.joint_table = joint_table(self.joints)
 
     def release(self, vertices: np.ndarray, axis: int) -> None:
         """Let vertices move freely along an axis again."""

@@ -180,7 +180,9 @@ class Biaxial:
     def begin(self) -> Iterator[Moment]:
         """Consolidate."""
         yield Moment(0.0, "consolidation")
+        self.model.spare_joints(True)
         ratio = consolidate(self.model, *self._pressures, tolerance=self._tolerance)
+        self.model.spare_joints(False)
         self.rest = np.array([ratio, self.model.steps_done])
 
     def run(self) -> Iterator[Moment]:

@@ -54,6 +54,16 @@ class Course:
         k = int(np.searchsorted(self.times, time, side="right"))
         return float(self.times[k]) if k < len(self.times) else float("inf")
 
+    def next_turn(self, time: float) -> float:
+        """Time of the next point at which it jumps, or rises before and does not behind, and the like."""
+        rises = np.sign([self.slope(t) for t in self.times])
+        before = np.concatenate([[0.0], rises[:-1]])
+        jumps = np.zeros(len(self.times), dtype=bool)
+        jumps[1:] = np.diff(self.times) == 0.0
+        turns = self.times[(rises != before) | jumps]
+        k = int(np.searchsorted(turns, time, side="right"))
+        return float(turns[k]) if k < len(turns) else float("inf")
+
     def integral(self, time: float) -> float:
         """Integral from 0 to `time`, exact."""
         inner = self.times[(self.times > 0.0) & (self.times < time)]

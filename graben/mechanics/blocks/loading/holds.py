@@ -86,7 +86,9 @@ class Holds(Programme):
         """What is tried next: further up, between, or the upper end once more, from a new lower one."""
         if np.isinf(self.high):
             further = self.low * _FACTOR if self.weaken else self.low + _FIRST * self.end
-            return min(further, self.last)
+            # Between two turns loads go one way: what is borne at both ends is borne between.
+            turn = np.inf if self.weaken else self.loads.next_turn(self.low)
+            return min(further, turn, self.last)
         if self.narrow and not self.tried:
             return self.high
         return 0.5 * (self.low + self.high)

@@ -64,6 +64,10 @@ class Loads:
         """Time of the next point of any course; infinite after the last."""
         return min((course.next_point(time) for _, course in self.patterns), default=float("inf"))
 
+    def next_turn(self, time: float) -> float:
+        """Time of the next point at which any course jumps or turns; infinite after the last."""
+        return min((course.next_turn(time) for _, course in self.patterns), default=float("inf"))
+
 
 def on_segment(bodies: Bodies, start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """Vertices (flags) on the outline that lie on a segment (start, end: (2,) m)."""

@@ -16,16 +16,15 @@ from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.courses import Course
 from graben.mechanics.blocks.loading.excavation import Dig, blocks_in
 from graben.mechanics.blocks.loading.failure import Failure, failure_of, loss_of_balance, tenfold_speed
-from graben.mechanics.blocks.loading.falling import Falling
+from graben.mechanics.blocks.loading.falling import REST, Falling
 from graben.mechanics.blocks.loading.loads import Loads
 from graben.mechanics.blocks.loading.protocol import Moment, State, refuse_unlike
 from graben.mechanics.blocks.loading.resistance import Resistance
 from graben.mechanics.blocks.loading.rest import REST_DAMPING, imbalance, settle
 from graben.mechanics.blocks.loading.rise import Control, Rise, hold_load, raise_load
 
-# A block is at rest when its resultant is this share of the forces that bear on it, and what inertia and damping take
-# up in the mean, without swings, is the second share.
-_BLOCK_REST, _CREEP_REST = 0.02, 5e-4
+# A block is at rest when its resultant is this share of the forces that bear on it.
+_BLOCK_REST = 0.02
 
 # Steps between two looks at a body that is held, and the least number of steps after which it counts as restless.
 HOLD, RESTLESS = 100, 20_000
@@ -78,6 +77,7 @@ class Programme:
     def begin(self) -> Iterator[Moment]:
         """Bring the body to rest under its weight and steady pressures."""
         m, ratio = self.model, np.inf
+        m.spare_joints(True)
         yield from self._set_in()
         where = "rest under weight and steady pressures"
         advice = "the body does not stand; strengthen the joints or support it"
@@ -86,6 +86,7 @@ class Programme:
             if len(self.falling.blocks) and not self.may_fall:
                 self.rise.failed = self.rise.fell = True
                 break
+        m.spare_joints(False)
         self.rest = np.array([ratio, m.steps_done])
         self.reference = m.motion.x.copy()
         self.carried = self.reference
@@ -124,7 +125,7 @@ class Programme:
         return max(
             imbalance(model),
             self.tolerance * float(blocks.max()) / _BLOCK_REST,
-            self.tolerance * float(creep.max()) / _CREEP_REST,
+            self.tolerance * float(creep.max()) / REST,
         )
 
     def run(self) -> Iterator[Moment]:

@@ -93,3 +93,12 @@ def test_damping_can_be_changed_and_starts_again():
     assert model.damping_coefficient == 3.0
     model.damp(Damping())
     assert model.damping_coefficient == pytest.approx(0.01 / DT)
+
+
+def test_a_course_turns_where_it_jumps_or_changes_its_way():
+    course = Course([(0, 0.0), (10, 1.0), (20, 3.0), (30, 1.0), (40, 1.0), (40, 2.0), (50, 4.0)])
+    turns, time = [], -1.0
+    while np.isfinite(time := course.next_turn(time)):
+        turns.append(time)
+    assert turns == [0.0, 20.0, 30.0, 40.0, 50.0]
+    assert Course([(0.0, 5.0)], 1.0).next_turn(0.0) == np.inf

@@ -20,9 +20,9 @@ def rectangle(x0, y0, x1, y1):
     return np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float)
 
 
-def body(shapes, outline, friction, dt, cohesion=0.0, **options):
+def body(shapes, outline, friction, dt, cohesion=0.0, residual=-1.0, **options):
     bodies = build_bodies(from_polygons(shapes, outline))
-    joint = Joint(1e10, 5e9, np.tan(np.radians(friction)), cohesion, 0.0, 0.0, np.inf)
+    joint = Joint(1e10, 5e9, np.tan(np.radians(friction)), cohesion, 0.0, 0.0, np.inf, residual_friction=residual)
     model = BlockModel(
         bodies, young=20e9, poisson=0.2, density=RHO, joint=joint, rounding=0.005, dt=dt, gravity=(0.0, -G), **options
     )
@@ -107,3 +107,45 @@ def test_strength_falls_by_a_factor_and_comes_back():
     assert model.skeleton.zones.bounds[0] == pytest.approx(np.sin(half.friction))
     model.weaken(1.0)
     assert np.array_equal(model.joint_table, before[0]) and np.array_equal(model.skeleton.zones.bounds, before[1])
+
+
+def test_a_peak_of_a_course_is_held():
+    """A peak above the strength between two tries, 10 % of the rise apart, is not stepped over."""
+    model = body([rectangle(0, -0.5, 2, 0), rectangle(0, 0, 2, 1)], rectangle(0, -0.5, 2, 1), 20.0, 4e-3)
+    exact = RHO * G * 2.0 * np.tan(np.radians(20.0))
+    course = Course([(0.0, 0.0), (4.2, 0.5 * exact), (4.5, 1.5 * exact), (4.8, 0.5 * exact), (10.0, 0.5 * exact)])
+    loads = Loads(len(model.bodies.position))
+    loads.add(pressure_forces(model.bodies, (0, 0), (0, 1)), course)
+    test = Holds(model, loads, Control(), end=10.0, save_every=1.0, tolerance=1e-3, steps=2500, width=0.02)
+    for _ in (*test.begin(), *test.run()):
+        pass
+    found = test.failure()
+    assert test.failed and course.at(found.low) <= exact <= course.at(found.high)
+    assert 4.2 < found.low < found.high <= 4.5
+
+
+@pytest.mark.parametrize("slope", [1.0, 3.0])
+def test_what_slides_down_a_flat_plane_is_no_rest(slope):
+    """What drives the block is small beside the forces on it; a bracket holds the closed form all the same.
+
+    What counts as rest, 1e-5 of all forces on it, is 2e-5 / tan(slope) of what drives it: 0.11 % at 1 deg.
+    """
+    friction = 3.0 * slope
+    exact = np.tan(np.radians(friction)) / np.tan(np.radians(slope))
+    test, _ = weakened(on_incline(slope, friction), width=0.02)
+    found = test.failure()
+    missed = 2e-5 / np.tan(np.radians(slope))
+    assert found.low * (1.0 - missed) < exact < found.high
+
+
+def test_joints_keep_their_first_strength_until_the_first_state():
+    """No force has broken a joint of a body that is put under its weight, though it has no cohesion.
+
+    Later the end up the slope breaks first, which bears less; the body falls when what is left there and the whole
+    strength of the other end do not hold it. Both ends are those of the flat between the rounded corners.
+    """
+    slope, peak, residual, rounding = np.radians(15.0), np.radians(20.0), np.radians(10.0), 0.005
+    upper = 0.5 - 0.5 * np.tan(slope) / (1.0 - 2.0 * rounding)
+    exact = ((1.0 - upper) * np.tan(peak) + upper * np.tan(residual)) / np.tan(slope)
+    test, _ = weakened(on_incline(15.0, 20.0, residual=np.tan(residual)), width=0.02)
+    assert exact > 1.0 and test.failure().load == pytest.approx(exact, rel=0.015)
