@@ -20,6 +20,15 @@ def test_a_vtu_opens_in_vtk_with_its_fields(tmp_path):
     assert grid.cell_data["stress"][1].tolist() == [6, 7, 8, 9, 10, 11]
 
 
+def test_a_grid_without_cells_opens_too(tmp_path):
+    import pyvista
+
+    path = tmp_path / "none.vtu"
+    write_vtu(path, SQUARE, {"line": np.zeros((0, 2))}, cell_data={"force": np.zeros((0, 2)), "gap": np.zeros(0)})
+    grid = pyvista.read(path)
+    assert grid.n_cells == 0 and grid.n_points == 4
+
+
 def test_a_series_puts_states_on_a_time_axis(tmp_path):
     import pyvista
 

@@ -179,7 +179,8 @@ class ProgrammeReport:
             load = there = 0.5 * (low + high)
         low, high = low - _REPEATS * abs(load), high + _REPEATS * abs(load)
         over = abs(course.at(float(self.test.look_table()[self.test.first_look :, 0].max())) - load)
-        shares = [number(v / abs(load)) if load else None for v in (abs(there - load), high - low, over)]
+        size = abs(load) or max(abs(low), abs(high))
+        shares = [number(v / size) if size else None for v in (abs(there - load), high - low, over)]
         return dict(zip(_FAILURE, (load, low, high, settlement, *shares), strict=True))
 
     def _safety(self) -> dict[str, float | None]:

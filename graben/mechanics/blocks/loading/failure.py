@@ -92,9 +92,7 @@ def tenfold_speed(load: np.ndarray, way: np.ndarray, step: np.ndarray) -> float 
 
     Arguments as above. The first speed is the mean one up to a twentieth of the largest load.
     """
-    apart = (
-        np.concatenate([[0], np.flatnonzero(np.diff(step // _SPEED)) + 1]) if len(step) else np.zeros(0, dtype=int)
-    )
+    apart = np.flatnonzero(np.diff(step // _SPEED, prepend=-1.0))
     if len(apart) < 3 or not load.max() > 0.0:
         return None
     load, way, step = load[apart], way[apart], step[apart]

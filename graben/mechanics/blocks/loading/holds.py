@@ -16,12 +16,10 @@ from graben.errors import Refused
 from graben.mechanics.blocks.loading.failure import Failure
 from graben.mechanics.blocks.loading.programme import HOLD, RESTLESS, Programme
 from graben.mechanics.blocks.loading.protocol import Moment, State
-from graben.mechanics.blocks.loading.rest import REST_DAMPING
-from graben.mechanics.blocks.loading.rise import hold_load
 from graben.mechanics.blocks.record import snapshot
 
-# A first step, over the whole rise; steps that it takes at least, and steps of rest after it; tries at most.
-_FIRST, _LEAST, _STILL, _TRIES = 0.1, 500, 2000, 60
+# A first step, over the whole rise; steps that it takes at least; tries at most.
+_FIRST, _LEAST, _TRIES = 0.1, 500, 60
 
 # Strength is reduced from what holds more or less everything, by factors, up to what holds next to nothing.
 _STRONG, _FACTOR, _WEAK = 0.125, 1.5, 20.0
@@ -40,7 +38,7 @@ class Holds(Programme):
         super().__init__(*arguments, **options)
         self.steps, self.width, self.weaken = steps, width, weaken
         self.low, self.high, self.tried = (_STRONG if weaken else 0.0), np.inf, False
-        self.last, self.tries = (_WEAK if weaken else self.end), 0
+        self.last, self.tries, self._fallen = (_WEAK if weaken else self.end), 0, 0
         if weaken:
             self.model.weaken(self.low)
 
@@ -99,32 +97,24 @@ class Holds(Programme):
 
     def _try(self, target: float) -> Iterator[Moment]:
         """Go there from where the body rests, and hold."""
-        m, rise, start = self.model, self.rise, self.rise.load_time
-        self.at_rest = False
+        rise, start = self.rise, self.rise.load_time
+        self.at_rest, self._fallen = False, len(self.falling.blocks)
         share = _FIRST if self.weaken else (target - start) / self.end
         chunks = max(_LEAST, round(share * self.steps)) // HOLD + 1
-        fallen = len(self.falling.blocks)
-
-        def fell() -> bool:
-            return not self.may_fall and len(self.falling.blocks) > fallen
-
         for k in range(chunks):
             self._load((k + 1) / chunks, start, target)
             self._advance(steady=False)
             words = f"at {rise.load_time:.4g}, going to {target:.4g}"
             yield self._moment(save=False)._replace(words=words)
-            if fell():
+            if self._over():
                 return
-        damping, held = m.damping, 0
-        m.damp(REST_DAMPING)
-        while not self.at_rest and not fell() and held < max(RESTLESS, self.steps):
-            self._advance(steady=True)
-            held += HOLD
-            ratio = self._unrest(m)
-            self.at_rest = held >= _STILL and ratio < self.tolerance and not fell()
-            words = f"at {target:.4g}, {held} steps, unbalanced force ratio {ratio:.2g}"
+        for steps, ratio in self._stand(max(RESTLESS, self.steps)):
+            words = f"at {target:.4g}, {steps} steps, unbalanced force ratio {ratio:.2g}"
             yield self._moment(save=False)._replace(words=words)
-        m.damp(damping)
+
+    def _over(self) -> bool:
+        """Whether a block fell in this try."""
+        return not self.may_fall and len(self.falling.blocks) > self._fallen
 
     def _load(self, share: float, start: float, target: float) -> None:
         """Loads, or strength, at a share of the way from start to target; loads get there by even steps."""
@@ -134,14 +124,10 @@ class Holds(Programme):
         else:
             self.loads.between(self.model, before, self.rise.load_time, HOLD)
 
-    def _advance(self, steady: bool) -> None:
-        hold_load(
-            self.model, self.rise, self.control, self.resistance,
-            steps=HOLD, direction=self.loads.direction, reference=self.reference,
-        )  # fmt: skip
+    def _advance(self, *, steady: bool) -> None:
+        super()._advance(steady=steady)
         if not self.weaken:
             self.loads.stay(self.model, self.rise.load_time)
-        self._look(steady=steady)
 
     def _look(self, *, steady: bool = False) -> None:
         super()._look(steady=steady)

@@ -26,8 +26,9 @@ from graben.mechanics.blocks.loading.rise import Control, Rise, hold_load, raise
 # A block is at rest when its resultant is this share of the forces that bear on it.
 _BLOCK_REST = 0.02
 
-# Steps between two looks at a body that is held, and the least number of steps after which it counts as restless.
-HOLD, RESTLESS = 100, 20_000
+# Steps between two looks at a body that is held; least numbers of steps after which it can be at rest, and after
+# which it counts as restless.
+HOLD, _STILL, RESTLESS = 100, 2000, 20_000
 
 
 class Programme:
@@ -151,23 +152,38 @@ class Programme:
             yield self._moment(save=True)
 
     def _hold(self) -> Iterator[Moment]:
-        """Let the body come to rest under all that acts now, or fail."""
-        m, rise, damping = self.model, self.rise, self.model.damping
+        """Let the body come to rest under the whole load, or fail."""
+        rise = self.rise
         if rise.load_time > self.end:
-            m.set_load(self.end - rise.since)
+            self.model.set_load(self.end - rise.since)
             rise.load_time = self.end
+        for steps, ratio in self._stand(max(RESTLESS, rise.steps)):
+            yield Moment(1.0, f"under the whole load, {steps} steps, unbalanced force ratio {ratio:.2g}")
+
+    def _stand(self, limit: int) -> Iterator[tuple[int, float]]:
+        """Steps under what acts now, until the body is at rest or has failed; gives their number and the unrest."""
+        m, steps, damping = self.model, 0, self.model.damping
         self.at_rest = False
         m.damp(REST_DAMPING)
-        while not rise.failed and not self.at_rest and rise.held < max(RESTLESS, rise.steps - rise.held):
-            hold_load(
-                m, rise, self.control, self.resistance,
-                steps=HOLD, direction=self.loads.direction, reference=self.reference,
-            )  # fmt: skip
-            self._look(steady=True)
+        while not self.at_rest and not self._over() and steps < limit:
+            self._advance(steady=True)
+            steps += HOLD
             ratio = self._unrest(m)
-            self.at_rest = not rise.failed and ratio < self.tolerance
-            yield Moment(1.0, f"under the whole load, {rise.held} steps, unbalanced force ratio {ratio:.2g}")
+            self.at_rest = steps >= _STILL and not self._over() and ratio < self.tolerance
+            yield steps, ratio
         m.damp(damping)
+
+    def _over(self) -> bool:
+        """Whether the body has failed."""
+        return self.rise.failed
+
+    def _advance(self, *, steady: bool) -> None:
+        """A chunk of steps without a frame, and a look. steady : no load changes"""
+        hold_load(
+            self.model, self.rise, self.control, self.resistance,
+            steps=HOLD, direction=self.loads.direction, reference=self.reference,
+        )  # fmt: skip
+        self._look(steady=steady)
 
     def _step(self, stop: float) -> None:
         """One chunk of steps under the loads as they rise. stop : load time that it must not run past [s]"""

@@ -56,7 +56,7 @@ class Rise:
     compliance : largest way per second of rise; speed : way per second now, over it
     largest : the largest load since then
     reached, way_there : the load that was hardly surpassed since, and the way there
-    steps : taken, held : those of them under the whole load
+    steps : taken
     failed : whether the ground went on without more load, or blocks fell; fell : the latter
     """
 
@@ -74,7 +74,6 @@ class Rise:
     reached: float = 0.0
     way_there: float = 0.0
     steps: int = 0
-    held: int = 0
     failed: bool = False
     fell: bool = False
 
@@ -143,7 +142,6 @@ def hold_load(
 ) -> None:
     """A chunk of steps under the whole load, which brings `rise` and `resistance` up to date."""
     gone, seconds = _advance(model, rise, resistance, steps, direction, reference)
-    rise.held += steps
     if rise.compliance > 0.0:
         rise.speed = gone / seconds / rise.compliance
         rise.failed = _went_on(rise, control)

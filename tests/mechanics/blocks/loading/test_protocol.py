@@ -41,26 +41,24 @@ def paced():
     )
 
 
-def dug():
+def pressed(rate):
+    """Blocks on a base, and a pressure on their top that rises by so much a second."""
     model = blocks(gravity=-9.81)
     base = on_segment(model.bodies, SQUARE[0], SQUARE[1])
     for axis in (0, 1):
         model.hold(base, axis)
     loads = Loads(len(base))
-    loads.add(pressure_forces(model.bodies, SQUARE[2], SQUARE[3]), Course([(0.0, 1e5)], 1e5))
+    loads.add(pressure_forces(model.bodies, SQUARE[2], SQUARE[3]), Course([(0.0, 1e5)], rate))
+    return model, loads, Control()
+
+
+def dug():
     digs = [Dig(HOLE, 2.5, relax_over=3.0)]
-    return Programme(model, loads, Control(), end=8.0, save_every=2.0, tolerance=1e-2, digs=digs)
+    return Programme(*pressed(1e5), end=8.0, save_every=2.0, tolerance=1e-2, digs=digs)
 
 
 def bracketed():
-    model = blocks(gravity=-9.81)
-    base = on_segment(model.bodies, SQUARE[0], SQUARE[1])
-    for axis in (0, 1):
-        model.hold(base, axis)
-    loads = Loads(len(base))
-    loads.add(pressure_forces(model.bodies, SQUARE[2], SQUARE[3]), Course([(0.0, 1e5)], 1e6))
-    options = {"end": 8.0, "save_every": 2.0, "tolerance": 1e-2, "steps": 800, "width": 0.2}
-    return Holds(model, loads, Control(), **options)
+    return Holds(*pressed(1e6), end=8.0, save_every=2.0, tolerance=1e-2, steps=800, width=0.2)
 
 
 def kept(test):
