@@ -24,7 +24,7 @@ def test_a_grid_without_cells_opens_too(tmp_path):
     import pyvista
 
     path = tmp_path / "none.vtu"
-    write_vtu(path, SQUARE, {"line": np.zeros((0, 2))}, cell_data={"force": np.zeros((0, 2)), "gap": np.zeros(0)})
+    write_vtu(path, SQUARE, {"line": np.zeros((0, 2))}, {}, {"force": np.zeros((0, 2)), "gap": np.zeros(0)})
     grid = pyvista.read(path)
     assert grid.n_cells == 0 and grid.n_points == 4
 

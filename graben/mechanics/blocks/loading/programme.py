@@ -143,7 +143,9 @@ class Programme:
             while self._dug < len(self._digs) and self._digs[self._dug].time <= rise.load_time + 0.5 * m.dt:
                 if m.time > self._saved_at:
                     yield self._moment(save=True)
-                self._dig(self._digs[self._dug])
+                yield from self._dig(self._digs[self._dug])
+            if rise.failed:
+                break
             self._step(self._digs[self._dug].time if self._dug < len(self._digs) else np.inf)
             yield self._moment(save=rise.failed or end > rise.load_time >= self._next_save)
         if rise.load_time >= end and not rise.failed:
@@ -181,7 +183,7 @@ class Programme:
         """A chunk of steps without a frame, and a look. steady : no load changes"""
         hold_load(
             self.model, self.rise, self.control, self.resistance,
-            steps=HOLD, direction=self.loads.direction, reference=self.reference,
+            steps=HOLD, end=self.end, direction=self.loads.direction, reference=self.reference,
         )  # fmt: skip
         self._look(steady=steady)
 
@@ -263,8 +265,12 @@ class Programme:
         """Share of the rise that the loads came to; None where none was to rise."""
         return min(1.0, self.rise.load_time / self.end) if self.looks else None
 
-    def _dig(self, dig: Dig) -> None:
-        """Take out the blocks of an excavation, the next one in turn."""
+    def _dig(self, dig: Dig) -> Iterator[Moment]:
+        """Take out the blocks of an excavation, the next one in turn.
+
+        Where their forces vanish at once the loads wait for the body: a block that slides must not be caught by more
+        load, which might press it down.
+        """
         m, rise = self.model, self.rise
         self._dug += 1
         forces = m.remove(blocks_in(m, dig.polygon))
@@ -274,6 +280,12 @@ class Programme:
         self.loads.begin(m, rise.load_time)
         rise.dig(rise.load_time)
         self.first_look = len(self.looks)
+        if dig.relax_over == 0.0:
+            for steps, ratio in self._stand(max(RESTLESS, rise.steps)):
+                yield Moment(
+                    min(1.0, rise.load_time / self.end), f"dug, {steps} steps, unbalanced force ratio {ratio:.2g}"
+                )
+            self.at_rest = None
 
     def _release(self, start: float, over: float, forces: np.ndarray) -> None:
         """Let forces that stand in for blocks taken out fade away."""

@@ -126,8 +126,7 @@ def raise_load(
         rise.compliance = max(rise.compliance, (rise.way - rise.way_since) / on)
     if rise.compliance > 0.0:
         rise.speed = gone / seconds / rise.compliance
-        known = rise.largest - rise.since > _SET_IN * end
-        rise.failed = known and _went_on(rise, control)
+        rise.failed = _went_on(rise, control, end)
 
 
 def hold_load(
@@ -137,14 +136,15 @@ def hold_load(
     resistance: Resistance,
     *,
     steps: int,
+    end: float,
     direction: np.ndarray,
     reference: np.ndarray,
 ) -> None:
-    """A chunk of steps under the whole load, which brings `rise` and `resistance` up to date."""
+    """A chunk of steps under loads that stay, which brings `rise` and `resistance` up to date; rest as above."""
     gone, seconds = _advance(model, rise, resistance, steps, direction, reference)
     if rise.compliance > 0.0:
         rise.speed = gone / seconds / rise.compliance
-        rise.failed = _went_on(rise, control)
+        rise.failed = _went_on(rise, control, end)
 
 
 def _advance(
@@ -162,9 +162,13 @@ def _advance(
     return model.way - way, steps * model.dt
 
 
-def _went_on(rise: Rise, control: Control) -> bool:
-    """Whether the ground has gone further than it had at the largest load, by the share allowed."""
-    return rise.way > (1.0 + control.beyond) * rise.way_there
+def _went_on(rise: Rise, control: Control, end: float) -> bool:
+    """Whether the ground has gone further than it had at the largest load, by the share allowed.
+
+    Nobody knows while a load sets in.
+    """
+    known = rise.largest - rise.since > _SET_IN * end
+    return known and rise.way > (1.0 + control.beyond) * rise.way_there
 
 
 def _rate(model: BlockModel, rise: Rise, control: Control, end: float) -> tuple[float, float]:

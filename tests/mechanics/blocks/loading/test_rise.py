@@ -6,6 +6,7 @@ import pytest
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.courses import Course
+from graben.mechanics.blocks.loading.excavation import Dig
 from graben.mechanics.blocks.loading.falling import Falling
 from graben.mechanics.blocks.loading.loads import Loads, on_segment, pressure_forces
 from graben.mechanics.blocks.loading.programme import Control, Programme
@@ -184,6 +185,31 @@ def test_a_body_that_bears_all_has_not_failed_and_one_that_never_tells_says_how_
     hasty = Control(beyond=1e6, patience=1.5)
     test = tried(model, ((0, 0), (0, 1)), Course([(0.0, 0.0)], 2.0 * exact / end), end, hasty)
     assert not test.rise.failed and 0.4 < test.reached < 0.6
+
+
+@pytest.mark.parametrize("hold", [True, False])
+def test_a_block_whose_stop_is_dug_out_slides_though_a_load_would_come_to_press_it_down(hold):
+    """A plane of 35 deg, friction of 20 deg: at the dig the pressure on the block is 1.1 or 0.9 of what holds it."""
+    end, slope = 40.0, np.radians(35.0)
+    shapes = [rectangle(0, -0.5, 4, 0), rectangle(1, 0, 2, 1), rectangle(2, 0, 4, 1)]
+    gravity = (-G * np.sin(slope), -G * np.cos(slope))
+    model = standing(shapes, rectangle(0, -0.5, 4, 1), friction=20.0, end=end, steps=5000, gravity=gravity)
+    for axis in (0, 1):
+        model.hold(on_segment(model.bodies, np.array([1.0, 0.0]), np.array([1.0, 1.0])), axis)
+    # The pressure that holds the block at rest, without the stop.
+    holds = RHO * G * (np.sin(slope) / np.tan(np.radians(20.0)) - np.cos(slope))
+    loads = Loads(len(model.bodies.position))
+    at_dig = 1.1 * holds if hold else 0.9 * holds
+    course = Course([(0.0, 0.0), (0.5 * end, at_dig), (end, 2.0 * holds)])
+    loads.add(pressure_forces(model.bodies, (2, 1), (4, 1)), course)
+    dig = Dig(np.array([(1, 0), (2, 0), (2, 1), (1, 1)], dtype=float), 0.5 * end)
+    test = Programme(model, loads, Control(), end=end, save_every=end, tolerance=1e-3, digs=[dig])
+    for _ in (*test.begin(), *test.run()):
+        pass
+    assert test.failed is not hold and test.at_rest is (True if hold else None)
+    if not hold:
+        assert test.falling.blocks.tolist() == [2]
+        assert test.failure().load == pytest.approx(0.5 * end, rel=0.001)
 
 
 def falls(model, steps, chunk=100, falling=None):
