@@ -14,21 +14,22 @@ from typing import Any
 
 import numpy as np
 
+import graben
 from graben.schemas.artifact import read_artifact
+from graben.schemas.quantities import to_si
 
 # Yetisir (2016) 4.5, figure 4.6: failure load by UDEC, and the settlement read off there, smallest and largest.
 SOURCE_PA = 11.2e6
 SOURCE_SETTLEMENT_M = (0.13, 0.22)
-# Pressure per second of even rise in slope-blocks.toml.
-RATE_PA = 0.25e6
 
 
 def curves(blocks: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Settlement [m], pressure [MPa] and that which is borne at rest (looks,)."""
     data = read_artifact(blocks, "blocks")
+    rate = to_si(graben.provenance(blocks).scene["programme"]["loads"][0]["rate"], "Pa/s")
     names = ("look_settlement", "look_load_time", "look_load_at_rest")
     settlement, load, rest = (data[name].values for name in names)
-    return settlement, load * RATE_PA / 1e6, rest * RATE_PA / 1e6
+    return settlement, load * rate / 1e6, rest * rate / 1e6
 
 
 def main() -> None:
