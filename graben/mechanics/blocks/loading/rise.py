@@ -28,6 +28,9 @@ _SET_IN = 0.02
 # A load of so much more than another one is hardly more.
 _HARDLY = 1.002
 
+# Under a dead load the ground runs away at so many times the largest way per second so far.
+_RUNS = 10.0
+
 # The frame adds at most this share to the squared frequency that the time step bears.
 _STABLE = 0.25
 
@@ -165,10 +168,11 @@ def _advance(
 def _went_on(rise: Rise, control: Control, end: float) -> bool:
     """Whether the ground has gone further than it had at the largest load, by the share allowed.
 
-    Nobody knows while a load sets in.
+    A dead load only grows: the ground runs away under it. Nobody knows while a load sets in.
     """
     known = rise.largest - rise.since > _SET_IN * end
-    return known and rise.way > (1.0 + control.beyond) * rise.way_there
+    runs = control.frame == 0.0 and rise.speed > _RUNS
+    return known and (runs or rise.way > (1.0 + control.beyond) * rise.way_there)
 
 
 def _rate(model: BlockModel, rise: Rise, control: Control, end: float) -> tuple[float, float]:

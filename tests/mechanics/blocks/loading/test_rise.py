@@ -79,6 +79,18 @@ def test_a_block_that_is_pushed_slides_at_its_friction(rigid):
     assert course.at(failure.load) == pytest.approx(exact, rel=0.01)
 
 
+def test_a_dead_load_ends_where_the_body_runs_away():
+    end = 40.0
+    shapes = [rectangle(0, -0.5, 2, 0), rectangle(0, 0, 2, 1)]
+    model = standing(shapes, rectangle(0, -0.5, 2, 1), friction=20.0, end=end, steps=10_000)
+    exact = RHO * G * 2.0 * np.tan(np.radians(20.0))
+    course = Course([(0.0, 0.0)], 2.0 * exact / end)
+    failure, looks = failed(model, ((0, 0), (0, 1)), course, end, Control(frame=0.0))
+    assert course.at(failure.load) == pytest.approx(exact, rel=0.02)
+    assert course.at(failure.low) < 1.005 * exact and exact < 1.005 * course.at(failure.high)
+    assert (np.diff(looks[:, 0]) > 0.0).all()
+
+
 def test_a_support_pressure_that_is_lowered_lets_the_block_go():
     # A block on a slippery slope of 45 deg, held back by a pressure on its lower side.
     end = 40.0
