@@ -138,6 +138,7 @@ def test_worker_processes_find_it_by_its_module(measured):
 
 
 def test_worker_processes_say_why_they_do_not_know_a_law(measured):
+    graben.material(NAME, **STEEL)  # this process imports the module and so knows "voce"; its workers do not
     with pytest.raises(graben.BadInput, match=r"law that worker processes find: one of .*, or module:law"):
         fitted("voce", measured, search="appso", workers=2)
 
