@@ -11,7 +11,7 @@ from _pytest.runner import runtestprotocol
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_protocol(item):
-    """Fixtures of any scope are set up for this test alone, so that none of them hides what another test left behind."""
+    """Fixtures of any scope are set up for this test alone: nothing hides what another test left behind."""
     hook, config = item.ihook, item.config
     hook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
     read, write = os.pipe()

@@ -48,6 +48,7 @@ ROWS = {
     "any-core": Row(seed=7, variables={"OPENBLAS_CORETYPE": "", "OPENBLAS_L2_SIZE": ""}),
     "threads-1": Row(seed=8, variables=_ONE_THREAD),
     "threads-2": Row(seed=9, variables=dict.fromkeys(_ONE_THREAD, "2")),
+    "alone": Row(seed=15, options=(*TWO, "-p", "tests.alone")),
     "busy": Row(seed=10, load=6),
     "py3.12": Row(seed=11, python="3.12"),
     "py3.13": Row(seed=12, python="3.13"),

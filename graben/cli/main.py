@@ -17,6 +17,7 @@ TOOLS = {
     "fem-run": ("graben.cli.fem_run:main", "Use the law in a finite-element model."),
     "scratch": ("graben.cli.scratch:main", "Scratch a specimen with one grain."),
     "wear-estimate": ("graben.cli.wear_estimate:main", "Combine bed and grooves into a wear rate."),
+    "tradeoff": ("graben.cli.tradeoff:main", "Error against cost, over settings of any stage."),
     "check": ("graben.cli.check:main", "Report every fault of scenes and artifacts."),
     "scene": ("graben.cli.scene:main", "Print a commented scene template, or its JSON Schema."),
     "show": ("graben.cli.show:main", "Draw an artifact as a picture."),

@@ -198,6 +198,8 @@ def _lines(headline: Mapping[str, Any], indent: str = "") -> Iterator[str]:
 
 
 def _short(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{k} {_short(v)}" for k, v in value.items())
     if isinstance(value, list):
         return "[" + ", ".join(map(_short, value)) + "]"
     return "none" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -25,6 +25,7 @@ LAYOUTS = {
     "fem": "graben.schemas.layouts.fem:LAYOUT",
     "scratch": "graben.schemas.layouts.scratch:LAYOUT",
     "wear": "graben.schemas.layouts.wear:LAYOUT",
+    "tradeoff": "graben.schemas.layouts.tradeoff:LAYOUT",
 }
 """Artifact kind -> its layout."""
 
