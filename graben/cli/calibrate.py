@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from graben.cli.budget import budget_option, options_of, within
 from graben.cli.options import FILE, Session, Tool, cluster_option, scene_argument, set_option, stage_options
 
 
@@ -26,6 +27,7 @@ from graben.cli.options import FILE, Session, Tool, cluster_option, scene_argume
     help="Hold the law of another scene against this one's by cross-validation on the same curves (repeatable).",
 )
 @click.option("--restart", is_flag=True, help="Go on where an interrupted run with the same output stopped.")
+@budget_option
 @cluster_option
 @set_option
 @stage_options
@@ -36,6 +38,7 @@ def main(
     validate: tuple[Path, ...],
     compare: tuple[Path, ...],
     restart: bool,
+    budget: float | None,
     cluster: str | None,
     overrides: tuple[str, ...],
     output: Path,
@@ -48,6 +51,8 @@ def main(
     """
     from graben.stages.calibrate import stage as calibrate
 
+    others = [*options_of("--validate", validate), *options_of("--compare", compare)]
+    overrides, told = within(session, budget, scene, ["calibrate", scene, *curves, *others], curves, overrides)
     with session.progress() as progress:
         headline = calibrate.run(
             scene,
@@ -61,4 +66,4 @@ def main(
             overwrite=overwrite,
             progress=progress,
         )
-    session.report(headline)
+    session.report(told(headline))

@@ -6,16 +6,24 @@ from pathlib import Path
 
 import click
 
+from graben.cli.budget import budget_option, within
 from graben.cli.options import Session, Tool, scene_argument, set_option, stage_options
 
 
 @click.command("dem-run", cls=Tool)
 @scene_argument
 @click.option("--restart", is_flag=True, help="Go on from the checkpoint that a stopped run of blocks left.")
+@budget_option
 @set_option
 @stage_options
 def main(
-    session: Session, scene: Path, restart: bool, overrides: tuple[str, ...], output: Path, overwrite: bool
+    session: Session,
+    scene: Path,
+    restart: bool,
+    budget: float | None,
+    overrides: tuple[str, ...],
+    output: Path,
+    overwrite: bool,
 ) -> None:
     """Run a scene of discrete rock (kind "blocks") or of grains (kind "particles").
 
@@ -23,8 +31,9 @@ def main(
     """
     from graben.stages.dem_run import stage as dem_run
 
+    overrides, told = within(session, budget, scene, ["dem-run", scene], [], overrides)
     with session.progress() as progress:
         headline = dem_run.run(
             scene, output, overrides=overrides, overwrite=overwrite, restart=restart, progress=progress
         )
-    session.report(headline)
+    session.report(told(headline))

@@ -18,6 +18,7 @@ TOOLS = {
     "scratch": ("graben.cli.scratch:main", "Scratch a specimen with one grain."),
     "wear-estimate": ("graben.cli.wear_estimate:main", "Combine bed and grooves into a wear rate."),
     "tradeoff": ("graben.cli.tradeoff:main", "Error against cost, over settings of any stage."),
+    "explain": ("graben.cli.explain:main", "What a run will model, leave out, take and be worth."),
     "check": ("graben.cli.check:main", "Report every fault of scenes and artifacts."),
     "scene": ("graben.cli.scene:main", "Print a commented scene template, or its JSON Schema."),
     "show": ("graben.cli.show:main", "Draw an artifact as a picture."),

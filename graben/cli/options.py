@@ -110,6 +110,11 @@ class Session:
             for text in warnings:
                 _tell(f"warning: {text}")
 
+    def tell(self, text: str) -> None:
+        """A line for a person, beside the numbers."""
+        if not self.quiet:
+            _tell(text)
+
     @contextmanager
     def progress(self) -> Iterator[Callable[[float, str], None]]:
         """Yield the callable a stage reports to: a bar on a terminal, otherwise a plain line every 10 s."""
@@ -189,6 +194,9 @@ def _lines(headline: Mapping[str, Any], indent: str = "") -> Iterator[str]:
         if isinstance(value, Mapping):
             yield f"{indent}{name}"
             yield from _lines(value, indent + "  ")
+        elif isinstance(value, list | tuple) and value and isinstance(value[0], str) and " " in value[0]:
+            yield f"{indent}{name}"
+            yield from (f"{indent}  {text}" for text in value)
         elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
             yield f"{indent}{name}"
             for row in value:

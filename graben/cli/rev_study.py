@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from graben.cli.budget import budget_option, options_of, within
 from graben.cli.options import FILE, Session, Tool, cluster_option, set_option, stage_options
 
 
@@ -26,6 +27,7 @@ from graben.cli.options import FILE, Session, Tool, cluster_option, set_option, 
     help='Scene of kind "calibrate": fit its law to every sample; the parameters must settle.',
 )
 @click.option("--processes", type=int, help="Processes that share the work (0: one per core).")
+@budget_option
 @cluster_option
 @set_option
 @stage_options
@@ -37,6 +39,7 @@ def main(
     grid: int | None,
     calibrate: Path | None,
     processes: int | None,
+    budget: float | None,
     cluster: str | None,
     overrides: tuple[str, ...],
     output: Path,
@@ -61,6 +64,9 @@ def main(
     if processes is not None:
         short.append(f"processes={processes}")
     study = load_scene(scene, "rev-study", short) if scene else default_scene("rev-study", short)
+    command = ["rev-study", *inputs, *options_of("--scene", [scene])]
+    more, told = within(session, budget, scene or study, command, inputs, short)
+    study = load_scene(study, "rev-study", more[len(short) :])
     with session.progress() as progress:
         headline = rev_study.run(inputs, study, output, cluster=cluster, overwrite=overwrite, progress=progress)
-    session.report(headline)
+    session.report(told(headline))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from graben.cli.budget import budget_option, options_of, within
 from graben.cli.options import FILE, Session, Tool, scene_argument, set_option, stage_options
 
 
@@ -16,12 +17,14 @@ from graben.cli.options import FILE, Session, Tool, scene_argument, set_option, 
     type=FILE,
     help="Use this law and its parameters instead of the scene's: NAME.material.toml or calibrate's artifact.",
 )
+@budget_option
 @set_option
 @stage_options
 def main(
     session: Session,
     scene: Path,
     material: Path | None,
+    budget: float | None,
     overrides: tuple[str, ...],
     output: Path,
     overwrite: bool,
@@ -34,8 +37,10 @@ def main(
     """
     from graben.stages.scratch import stage as scratch
 
+    command = ["scratch", scene, *options_of("--material", [material])]
+    overrides, told = within(session, budget, scene, command, [], overrides)
     with session.progress() as progress:
         headline = scratch.run(
             scene, output, material=material, overrides=overrides, overwrite=overwrite, progress=progress
         )
-    session.report(headline)
+    session.report(told(headline))

@@ -167,6 +167,11 @@ STAGES: tuple[Stage, ...] = (
 """Stages in the order of the two chains; homogenize and wear-estimate have no knob of accuracy."""
 
 
+def stage_of(kind: str) -> Stage | None:
+    """The stage whose scenes are of that kind; None where it has no knob."""
+    return next((s for s in STAGES if s.kind == kind), None)
+
+
 def knob(kind: str, key: str) -> Knob:
     """The knob of that key in the stage whose scenes are of that kind."""
     return next(k for s in STAGES if s.kind == kind for k in s.knobs if k.key == key)

@@ -21,6 +21,7 @@ class Estimate:
     count : how many, to a factor of about two; bytes : what they keep in memory
     key, value : the key of the scene that decides it, and what it says
     limit : a count above it is refused
+    steps : where the count is work, things times steps: those steps
     """
 
     name: str
@@ -29,11 +30,12 @@ class Estimate:
     key: str
     value: str
     limit: float = MOST_THINGS
+    steps: float = 0.0
 
 
 def work(name: str, things: float, steps: float, key: str, value: str) -> Estimate:
     """Things times steps, which cost time and no memory."""
-    return Estimate(name, things * steps, 0.0, key, value, MOST_WORK)
+    return Estimate(name, things * steps, 0.0, key, value, MOST_WORK, steps)
 
 
 def tiles(area: float, edge: float) -> float:

@@ -17,10 +17,11 @@ from graben.schemas.outputs import Outputs
 from graben.schemas.scene import load_scene
 from graben.stages.shared.last_good import keeps_last_good
 from graben.stages.shared.record import Progress, Record, silent
+from graben.stages.shared.run_apart import Run
 from graben.stages.shared.workers import compute
 from graben.stages.tradeoff.errors import Errors, cheapest_within, errors_of, front_of, limit_of
 from graben.stages.tradeoff.knobs import Knob, grid, knobs_of
-from graben.stages.tradeoff.runs import Run, Task, kept, make, name_of
+from graben.stages.tradeoff.runs import Task, kept, make, name_of
 
 # Kind of scene -> its command.
 COMMANDS = {

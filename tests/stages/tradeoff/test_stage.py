@@ -8,9 +8,9 @@ import pytest
 
 from graben.errors import BadInput, NumericsFailed
 from graben.schemas.artifact import check_artifact, read_artifact
+from graben.stages.shared.run_apart import Run
 from graben.stages.tools import picture
 from graben.stages.tradeoff import runs, stage
-from graben.stages.tradeoff.runs import Run
 from tests.conftest import command, made
 
 FEM = Path(__file__).parents[3] / "pipelines" / "upscaling" / "slope.toml"
@@ -36,7 +36,7 @@ def made_up(monkeypatch):
             return Run(3, {}, "the numerics failed: no equilibrium", 1.0, 1.0 / h, 1000)
         return Run(0, headline | {"warnings": ["doubtful"] if h == 0.5 else []}, "", 1.0, 1.0 / h, 1000)
 
-    monkeypatch.setattr(runs, "_run", run)
+    monkeypatch.setattr(runs, "measured", run)
     return called
 
 
