@@ -122,6 +122,8 @@ def check_call(words: list[str]) -> None:
     """Options of a command; and its scene, where it is one of ours, with what --set makes of it."""
     module, attribute = TOOLS[words[0]][0].split(":")
     known = {o for p in getattr(import_module(module), attribute).params for o in p.opts} | {"--help"}
+    # What stands behind "--" is for another command.
+    words = words[: words.index("--")] if "--" in words else words
     for word in words[1:]:
         assert not re.match(r"-[a-z]|--", word) or word in known, f"{words[0]} {word}"
     scenes = [w for w in words[1:] if w.startswith("pipelines/") and w.endswith(".toml")]
