@@ -66,6 +66,14 @@ verify-udec: $(READY) ## 16 tessellations of voronoi-granite against UDEC's curv
 verify-extrapolation: $(READY) ## laws fitted up to 4 MPa against our blocks at 3 to 10 MPa (12 CPU minutes)
 	$(BIN)/python pipelines/upscaling/verify_extrapolation.py $(RESULTS)/verify --picture docs/images/extrapolation.png
 
+.PHONY: tradeoffs
+tradeoffs: $(READY) ## what accuracy costs, every knob of every stage: docs/studies/tradeoffs.md (an hour; restartable)
+	$(BIN)/python pipelines/tradeoffs/study.py $(RESULTS) --page docs/studies/tradeoffs.md
+
+.PHONY: verify-promises
+verify-promises: $(READY) ## each fidelity against the error that it promises (20 minutes; restartable)
+	$(BIN)/python pipelines/tradeoffs/study.py $(RESULTS) --promises
+
 .PHONY: bench
 bench: $(READY) ## the benchmarks; JSON lines in results/bench/
 	@mkdir -p $(RESULTS)/bench
