@@ -13,7 +13,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +93,7 @@ class Session:
     as_json: bool
     quiet: bool
     verbose: int
+    strict: bool = False
 
     def report(self, headline: Mapping[str, Any]) -> None:
         """Print the headline numbers on stdout: one JSON object, or aligned lines for a person.
@@ -109,6 +110,9 @@ class Session:
             say(_lines(found))
             for text in warnings:
                 _tell(f"warning: {text}")
+        if self.strict and headline.get("warnings"):
+            _tell("--strict: the result is written, and it has warnings")
+            raise click.exceptions.Exit(3)
 
     def tell(self, text: str) -> None:
         """A line for a person, beside the numbers."""
@@ -223,13 +227,14 @@ def _session(ctx: click.Context, as_json: bool, quiet: bool, verbose: int) -> Se
 
 
 def stage_options(function: Callable[..., None]) -> Callable[..., None]:
-    """-o, --overwrite, --json, -v, -q, --debug. The command receives `session`, `output`, `overwrite`."""
+    """-o, --overwrite, --strict, --json, -v, -q, --debug. The command receives `session`, `output`, `overwrite`."""
 
     @click.option("-o", "--output", type=FILE, required=True, help="Artifact to write (NetCDF).")
     @click.option("--overwrite", is_flag=True, help="Replace the output if it exists.")
+    @click.option("--strict", is_flag=True, help="Exit code 3 where the result has warnings.")
     @session_options
-    def wrapped(**kwargs: Any) -> None:
-        function(**kwargs)
+    def wrapped(session: Session, strict: bool, **kwargs: Any) -> None:
+        function(session=replace(session, strict=strict), **kwargs)
 
     return _renamed(wrapped, function)
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import graben
+from graben.schemas.doubts import doubts_of
 from graben.schemas.plain import to_json
 from graben.schemas.scene import Scene
 
@@ -36,7 +37,7 @@ class Record:
     """Provenance and cost of one run. Begin it when a stage starts; `attributes` closes the clocks.
 
     ``cost`` takes the stage's own figures (steps, elements, energy error, ...), keys with units; ``warnings`` what a
-    person should know before trusting the result.
+    person should know before trusting the result, beginning with what the inputs warn of.
     """
 
     scene_text: str = ""
@@ -50,11 +51,18 @@ class Record:
     @classmethod
     def begin(cls, scene: Scene | None = None, inputs: Iterable[str | Path] = ()) -> Record:
         """Start the clocks and hash the inputs."""
+        read = list(inputs)
         return cls(
             scene_text=scene.source.effective_text if scene is not None else "",
             seed=scene.seed if scene is not None else None,
-            inputs={str(p): sha256_of(p) for p in inputs},
+            inputs={str(p): sha256_of(p) for p in read},
+            warnings=doubts_of(read),
         )
+
+    def warn(self, texts: Iterable[str]) -> list[str]:
+        """Add what the run itself has to say; returns all warnings."""
+        self.warnings = list(dict.fromkeys([*texts, *self.warnings]))
+        return self.warnings
 
     def closed_cost(self) -> dict[str, Any]:
         """The cost record with wall time, CPU time and peak memory up to now."""

@@ -11,7 +11,7 @@ hardening = "exponential"       # a word
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
 
@@ -23,6 +23,7 @@ from graben.schemas.files import whole_file
 from graben.schemas.quantities import key, plain_number, to_si
 from graben.schemas.reading import parse_toml, read_toml
 from graben.schemas.scene import InputFile, Model
+from graben.schemas.toml_text import toml_value
 
 _LARGEST = 1e12
 """Largest magnitude of a dimensionless parameter."""
@@ -129,7 +130,9 @@ def read_material(path: str | Path) -> tuple[str, dict[str, Any]]:
     else:
         _, tables = read_toml(path, "material file")
     extra = [
-        Fault(str(path), k, "", "no such key (law, parameters)") for k in tables if k not in ("law", "parameters")
+        Fault(str(path), k, "", "no such key (law, parameters, warnings)")
+        for k in tables
+        if k not in ("law", "parameters", "warnings")
     ]
     values, faults = _convert(tables.get("law"), tables.get("parameters", {}))
     found = extra + [Fault(str(path), k, repr(v), e) for k, v, e in faults]
@@ -141,9 +144,13 @@ def read_material(path: str | Path) -> tuple[str, dict[str, Any]]:
 _READABLE = {"Pa": (("GPa", 1e9), ("MPa", 1e6), ("kPa", 1e3)), "rad": (("deg", 0.017453292519943295),), "m": ()}
 
 
-def material_text(law: str, values: Mapping[str, Any], note: str = "") -> str:
-    """A NAME.material.toml that reads back to the same bits; readable units follow as comments."""
-    lines = [f"# {line}" for line in note.splitlines()] + [f'law = "{law}"', "", "[parameters]"]
+def material_text(law: str, values: Mapping[str, Any], note: str = "", warnings: Sequence[str] = ()) -> str:
+    """A NAME.material.toml that reads back to the same bits; readable units follow as comments.
+
+    warnings : what a stage that uses the material has to repeat
+    """
+    told = [f"warnings = {toml_value(list(warnings))}"] if warnings else []
+    lines = [f"# {line}" for line in note.splitlines()] + [f'law = "{law}"', *told, "", "[parameters]"]
     for name, value in values.items():
         p = parameter(law, name)
         assert p is not None  # values are of a law that took them
@@ -167,7 +174,9 @@ def material_table(law: str, values: Mapping[str, Any]) -> dict[str, Any]:
     return parse_toml(material_text(law, values))
 
 
-def write_material(path: str | Path, law: str, values: Mapping[str, Any], note: str = "") -> None:
+def write_material(
+    path: str | Path, law: str, values: Mapping[str, Any], note: str = "", warnings: Sequence[str] = ()
+) -> None:
     """Write `material_text` as a whole file or not at all."""
     with whole_file(path) as temporary:
-        temporary.write_text(material_text(law, values, note), encoding="utf-8")
+        temporary.write_text(material_text(law, values, note, warnings), encoding="utf-8")

@@ -92,7 +92,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         raise
     arrays = _arrays(model, history, report)
     headline = report.headline(arrays) | ground.mended
-    headline["warnings"] = record.warnings = warnings_of(report.measures(headline))
+    headline["warnings"] = record.warn(warnings_of(report.measures(headline)))
     arrays = ground.placed(arrays)
     record.cost |= {
         "steps": model.steps_done,

@@ -166,9 +166,9 @@ def run(
         keep_by(lambda why: state.path if any(state.starts.values()) else None)
         fitted = fit_curves(prepared, state, progress)
     record.cost.update(fitted.cost)
-    record.warnings = fitted.headline["warnings"]
+    fitted.headline["warnings"] = record.warn(fitted.headline["warnings"])
     with together():
-        write_material(material_path, scene.law, fitted.material, fitted.note)
+        write_material(material_path, scene.law, fitted.material, fitted.note, record.warnings)
         write_whole(output, LAYOUT, fitted.arrays, record, fitted.attributes)
     state.finish()
     progress(1.0, "done")

@@ -89,7 +89,7 @@ def run(
         progress=progress,
     )  # fmt: skip
     record.cost |= found.cost
-    record.warnings = found.headline["warnings"]
+    found.headline["warnings"] = record.warn(found.headline["warnings"])
     with together():
         if steps_picture is not None:
             from graben.stages.tools.show.outline_steps import save_steps

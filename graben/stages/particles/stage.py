@@ -77,7 +77,7 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
         "unbalanced_force_ratio": max(b.survey.unbalanced for b in beds),
         "largest_overlap_over_radius": max(b.survey.overlap for b in beds),
     }
-    record.warnings = warnings_of(_measures(record.cost))
+    record.warn(warnings_of(_measures(record.cost)))
     with together():
         if scene.output.vtk:
             _write_vtk(output, law, beds[0])

@@ -154,7 +154,7 @@ def run(
         attributes["law"] = law.law
     none = None if advice.radius else 1.0
     doubt = Measure("recommended_radius_m", none, 0.0, "no radius is recommended: " + advice.reason)
-    record.warnings = warnings_of([doubt])
+    record.warn(warnings_of([doubt]))
     write_whole(output, LAYOUT, arrays, record, attributes)
     return {
         "recommended_radius_m": advice.radius,

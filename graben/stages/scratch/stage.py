@@ -85,7 +85,7 @@ def run(
     progress(0.99, "sections")
     groove = measure_groove(scene, mesh, result)
     headline = {**groove.headline, **_cost(result)}
-    headline["warnings"] = record.warnings = warnings_of(_measures(headline))
+    headline["warnings"] = record.warn(warnings_of(_measures(headline)))
     record.cost.update(result.cost)
     record.cost.update({k: headline[k] for k in ("energy_error", "hourglass_share", "kinetic_share_sliding")})
     record.cost["mesh_size_m"] = mesh_size(scene)

@@ -53,6 +53,10 @@ def drawn(artifact: Path, form: str) -> bytes:
         dataset = dataset.assign({name: dataset[name].fillna(0.0) for name in floats})
         words = f"kept by a run that failed; numbers that are not finite are drawn as 0: {stopped}"
         figure.text(0.01, 0.005, words[:160], fontsize=7, color="firebrick")
+    warnings = str(dataset.attrs.get("warnings", "")).splitlines()
+    if warnings and stopped is None:
+        more = f" (and {len(warnings) - 1} more)" if len(warnings) > 1 else ""
+        figure.text(0.01, 0.005, f"warning: {warnings[0][:150]}{more}", fontsize=7, color="firebrick")
     picture = io.BytesIO()
     try:
         drawer.draw(dataset, figure)

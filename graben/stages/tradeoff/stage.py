@@ -115,7 +115,7 @@ def run(
     front = front_of(cpu.mean(axis=1), found.error)
     best = None if wanted is None else cheapest_within(wanted, cpu.mean(axis=1), found)
     warnings = list(_doubts(table, points, cpu, base, wanted, best))
-    record.warnings = warnings
+    warnings = record.warn(warnings)
     arrays = {
         "knob_key": np.array([k.key for k in grid_knobs]),
         "knob_value": np.array([[point[k.key] for k in grid_knobs] for point in points]),

@@ -73,7 +73,7 @@ def run(
     prepared = prepare(scene, bed, scratch)
     record = Record.begin(scene, prepared.inputs)
     rows = prepared.rows
-    record.warnings = prepared.warnings
+    record.warn(prepared.warnings)
 
     arrays = {
         "mixture_name": np.array([m.name for m in scene.mixtures]),

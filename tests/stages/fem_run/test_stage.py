@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from graben.cli.fem_run import main
 from graben.errors import BadInput
+from graben.mechanics.fem.collapse import LoadCurve
 from graben.schemas.artifact import check_artifact, read_artifact
 from graben.stages.fem_run import stage as fem_run
 
@@ -328,3 +329,22 @@ def test_a_negative_softening_width_is_refused(tmp_path):
     result = invoke(tmp_path, text=text)
     assert result.exit_code == 2
     assert "softening_width" in result.output
+
+
+def test_a_march_that_stops_without_a_collapse_has_no_failure_load(tmp_path, monkeypatch):
+    """Compliance 3.8 and stiffness .42, as seen at half of a limit load."""
+    monkeypatch.setattr(LoadCurve, "compliance_ratio", lambda self: 3.8)
+    ratios = iter([1.0, 0.42])
+    monkeypatch.setattr(fem_run, "softest_stiffness", lambda *arguments: next(ratios))
+    headline = json.loads(invoke(tmp_path, "--json", "-q").stdout)
+    assert headline["failed"] and headline["failure_load_pa"] is None and headline["last_load_pa"] > 1e5
+    assert "that is no collapse" in headline["reason"] and "not known" in headline["warnings"][0]
+
+
+@pytest.mark.parametrize(("compliance", "stiffness"), [(3.8, 0.1), (16.0, 0.42)])
+def test_either_evidence_is_enough_for_a_collapse(tmp_path, monkeypatch, compliance, stiffness):
+    monkeypatch.setattr(LoadCurve, "compliance_ratio", lambda self: compliance)
+    ratios = iter([1.0, stiffness])
+    monkeypatch.setattr(fem_run, "softest_stiffness", lambda *arguments: next(ratios))
+    headline = json.loads(invoke(tmp_path, "--json", "-q").stdout)
+    assert headline["failure_load_pa"] == headline["last_load_pa"] > 1e5 and headline["warnings"] == []
