@@ -19,6 +19,14 @@ ifeq ($(MAKELEVEL),0)
 MAKEFLAGS += -j$(JOBS)
 endif
 
+# make upscaling BUDGET="10 min": the finest fidelity at which the chain fits (make install first).
+ifdef BUDGET
+FIDELITY := $(shell $(BIN)/python pipelines/budget.py $(firstword $(MAKECMDGOALS)) "$(BUDGET)" --jobs $(JOBS))
+ifeq ($(FIDELITY),)
+$(error no fidelity for BUDGET)
+endif
+endif
+
 include pipelines/upscaling/upscaling.mk
 include pipelines/wear/wear.mk
 
