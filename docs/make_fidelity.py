@@ -20,6 +20,9 @@ leaves them out. This page is made by [make_fidelity.py](../make_fidelity.py).
   stays small ([theory](../theory/blocks.md#loading)).
 - "no key": the fidelity alone decides.
 
+A stage with a promise says by how much its headline number may differ from that at reference, and
+what that costs. `make verify-promises` holds them against runs ([study](../studies/tradeoffs.md)).
+
 homogenize and wear-estimate have no knob of accuracy.
 """
 NOTES = {
@@ -37,7 +40,7 @@ def page() -> str:
         parts.append(f"## {title}\n")
         if stage.kind in NOTES:
             parts.append(NOTES[stage.kind] + "\n")
-        parts.append("\n".join(table(stage)) + "\n")
+        parts.append("\n".join([*promised(stage), *table(stage)]) + "\n")
     return "\n".join(parts)
 
 
@@ -47,6 +50,15 @@ def table(stage: Stage) -> list[str]:
     for steady, knobs in groupby(sorted(stage.knobs, key=lambda k: k.steady), lambda k: k.steady):
         lines += [row(k, steady) for k in knobs]
     return lines
+
+
+def promised(stage: Stage) -> list[str]:
+    """What each fidelity promises, in a sentence; nothing where nothing was measured."""
+    if not stage.promises:
+        return []
+    errors = ", ".join("none" if p.error is None else f"{100 * p.error:g} %" for p in stage.promises)
+    costs = ", ".join(f"{p.cost:g}" for p in stage.promises if p.cost is not None)
+    return [f"Promised error of `{stage.headline}`: {errors}. CPU time over that of a draft: {costs}.", ""]
 
 
 def row(k: Knob, steady: bool) -> str:
