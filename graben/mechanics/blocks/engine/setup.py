@@ -25,6 +25,7 @@ from graben.mechanics.cache_lines import aligned
 class Rock(NamedTuple):
     """Rock of all blocks: young [Pa], poisson, density [kg/m3]; strength at which zones yield, None: elastic;
     rigid : blocks do not deform, the moduli and the strength then count for nothing.
+    platens : young [Pa] and poisson of platens; None: as the others
     """
 
     young: float
@@ -32,6 +33,7 @@ class Rock(NamedTuple):
     density: float
     strength: Strength | None = None
     rigid: bool = False
+    platens: tuple[float, float] | None = None
 
 
 class Made(NamedTuple):
@@ -63,6 +65,9 @@ def zones_and_masses(
     """
     gradient, area = shape_gradients(bodies.position, bodies.zone_vertex)
     lam, mu = (np.full(len(area), c) for c in lame(rock.young, rock.poisson))
+    if rock.platens is not None:
+        of_platens = bodies.zone_block >= bodies.rock
+        lam[of_platens], mu[of_platens] = lame(*rock.platens)
     thirds = np.repeat(rock.density * area / 3.0, 3)
     true_mass = np.bincount(bodies.zone_vertex.ravel(), weights=thirds, minlength=len(bodies.position))
     stiffest = max(max(j.stiffest, j.shear_stiffness) for j in joints)
