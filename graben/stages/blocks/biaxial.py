@@ -95,7 +95,7 @@ class BiaxialReport:
         sides, push = rectangle_sides(self.model.bodies.outline), arrays["wall_reaction"][:, :, 1]
         return push[:, sides.bottom], push[:, sides.left] + push[:, sides.right], -push[:, sides.top]
 
-    def _of_friction(self, arrays: dict[str, np.ndarray], upto: slice) -> dict[str, float]:
+    def _of_friction(self, arrays: dict[str, np.ndarray], upto: slice) -> dict[str, float | None]:
         """Means of what friction and supports add, where there may be any."""
         if not self._gripped:
             return {}

@@ -10,7 +10,7 @@ from graben.mechanics.blocks.loading.ends import Ends, Walls
 from graben.mechanics.blocks.loading.ends import Platens as PlatenEnds
 from graben.mechanics.blocks.loading.loads import on_segment
 from graben.mechanics.blocks.shape.bodies import Bodies
-from graben.mechanics.blocks.shape.platens import LEFT, PlatenShape, with_platens
+from graben.mechanics.blocks.shape.platens import BOTTOM, LEFT, PlatenShape, with_platens
 from graben.mechanics.blocks.shape.tessellation import Tessellation
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.schemas.scenes.blocks_loading import Platens
@@ -46,25 +46,26 @@ def with_contacts(
     end = Joint(
         rock[0].normal_stiffness if platens.normal_stiffness is None else platens.normal_stiffness,
         rock[0].shear_stiffness if platens.shear_stiffness is None else platens.shear_stiffness,
-        float(np.tan(platens.friction)),
+        0.0,
         0.0,
         0.0,
         0.0,
         np.inf,
     )
-    joints, sets = [*rock, end], np.zeros(len(bodies.edge_from), dtype=np.int64)
-    if bodies.edge_set is not None:
-        sets[:] = bodies.edge_set
-    block = bodies.vertex_block[bodies.edge_from]
-    sets[block >= bodies.rock] = len(joints) - 1
+    angles = [platens.friction]
     if platens.sides:
-        angle = platens.friction if platens.side_friction is None else platens.side_friction
-        joints.append(end._replace(friction=float(np.tan(angle))))
-        sets[block >= bodies.rock + LEFT] = len(joints) - 1
-    # Between rock and platen the platen's contact holds, whose number is the larger one.
-    table = np.maximum.outer(np.arange(len(joints)), np.arange(len(joints)))
-    own = np.arange(len(rock))
+        angles.append(platens.friction if platens.side_friction is None else platens.side_friction)
+    block = bodies.vertex_block[bodies.edge_from]
+    sets = np.zeros(len(block), dtype=np.int64) if bodies.edge_set is None else bodies.edge_set.astype(np.int64)
+    count, own = len(rock) + 2 * len(angles), np.arange(len(rock))
+    joints, table = list(rock), np.zeros((count, count), dtype=np.int64)
     table[: len(rock), : len(rock)] = np.minimum.outer(own, own) if between is None else between
+    for k, angle in enumerate(angles):
+        first = len(rock) + 2 * k
+        joints += [end._replace(friction=float(np.tan(angle)), face=face) for face in (1, 2)]
+        sets[block >= bodies.rock + (BOTTOM, LEFT)[k]] = first
+        # The set of a contact is looked up by that of its first edge, then that of its second.
+        table[first, : len(rock)], table[: len(rock), first] = first, first + 1
     return joints, sets, table
 
 

@@ -94,7 +94,7 @@ class BlockModel(ModelState):
         setup.refuse_unsound(rock, self.joints)
         self.damping = damping or Damping()
         made = setup.zones_and_masses(bodies, rock, self.joints, dt, self.damping.local)
-        given, self._set_of = setup.sets_of_edges(bodies, len(self.joints), edge_set, set_between)
+        given, self._set_of = setup.sets_of_edges(bodies, self.joints, edge_set, set_between)
         self.bodies = bodies
         self.skin = chamfered_skin(bodies, rounding)
         self.parts = cut_into_parts(bodies, self.skin)

@@ -99,16 +99,20 @@ def _rigid(
 
 
 def sets_of_edges(
-    bodies: Bodies, count: int, edge_set: np.ndarray | None, set_between: np.ndarray | None
+    bodies: Bodies, joints: Sequence[Joint], edge_set: np.ndarray | None, set_between: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Set of each outline edge, and the set that holds between edges of two sets; as given, checked."""
-    sets = np.arange(count)
+    sets = np.arange(len(joints))
     given = np.zeros(len(bodies.edge_from)) if edge_set is None else np.asarray(edge_set)
     between = np.minimum.outer(sets, sets) if set_between is None else np.asarray(set_between)
     if given.shape != bodies.edge_from.shape or not np.isin(given, sets).all():
         raise Refused(f"edge_set: expected {len(bodies.edge_from)} numbers of joint sets (0 to {sets[-1]})")
-    if between.shape != (len(sets),) * 2 or not np.isin(between, sets).all() or np.any(between != between.T):
-        raise ValueError(f"set_between: expected a symmetric table {len(sets)} x {len(sets)} of joint sets")
+    # A contact with a face has a set for each order of its edges.
+    faced = np.array([j.face > 0 for j in joints])
+    if between.shape != (len(sets),) * 2 or not np.isin(between, sets).all():
+        raise ValueError(f"set_between: expected a table {len(sets)} x {len(sets)} of joint sets")
+    if np.any((between != between.T) & ~faced[between]):
+        raise ValueError("set_between: expected a symmetric table, but for contacts with a face")
     return given.astype(np.int64), np.ascontiguousarray(between, dtype=np.int64)
 
 
