@@ -41,6 +41,9 @@ def _table(model: type[BaseModel], prefix: str, skip: tuple[str, ...] = ()) -> l
                 *_comment(info),
                 *(f"# {line}" if line else "#" for line in _named_table(inner, prefix + name)),
             ]
+        elif inner is not None and value == []:
+            # Rows that are none by default: one is shown, commented out.
+            tables += ["", *_comment(info), *(f"# {line}" for line in [f"[[{prefix}{name}]]", *_row(inner)])]
         elif inner is not None and isinstance(value, list):
             for item in value:
                 tables += ["", *_comment(info), f"[[{prefix}{name}]]", *_given(item)]
@@ -55,6 +58,17 @@ def _table(model: type[BaseModel], prefix: str, skip: tuple[str, ...] = ()) -> l
         else:
             plain += [*_comment(info), f"{name} = {toml_value(value)}"]
     return plain + tables
+
+
+def _row(model: type[BaseModel]) -> list[str]:
+    """Keys of one entry of a list; "..." stands for what has no default."""
+    lines: list[str] = []
+    for name, info in model.model_fields.items():
+        known = bool(info.examples) or not info.is_required()
+        value = _example(info) if known else None
+        plain = value is None or isinstance(value, BaseModel) or value is _Default
+        lines += [*_comment(info), f"{name} = ..." if plain else f"{name} = {toml_value(value)}"]
+    return lines
 
 
 def _named_table(model: type[BaseModel], name: str) -> list[str]:

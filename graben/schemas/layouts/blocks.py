@@ -77,6 +77,15 @@ LAYOUT = Layout(
         "confining_stress_then": Variable(
             _T, "Pa", "normal stress applied to the lateral sides at the state, where it changes", optional=True
         ),
+        "lateral_over_applied_stress": Variable(
+            _T, "1", "mean lateral stress of zones in the middle over the one applied to the sides", optional=True
+        ),
+        "friction_over_confinement": Variable(
+            _T,
+            "1",
+            "lateral confinement by friction or supports at the ends over that by the pressure",
+            optional=True,
+        ),
         "outline": Variable(("wall", "axis"), "m", "corners of the domain before consolidation"),
         "contact_count": Variable(_T, "1", "contacts of the state", dtype="i4", sum_of="contact"),
         "contact_block": Variable(("contact", "pair"), "1", "blocks of the contact", dtype="i4", index_of="block"),

@@ -32,6 +32,7 @@ LAYOUT = Layout(
         "stress": Variable(_TENSOR, "Pa", "average Cauchy stress, tension positive", may_be_nan=True),
         "strain": Variable(_TENSOR, "1", "average strain since the first state, extension positive", may_be_nan=True),
         "confining_stress": Variable(_PATH, "Pa", "lateral stress of the test, tension positive", may_be_nan=True),
+        "lateral_over_applied_stress": _step("1", "average lateral stress over the one applied to the sides"),
         "area": Variable(
             _PATH,
             "m2",

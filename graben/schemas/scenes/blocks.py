@@ -267,6 +267,8 @@ class BlocksScene(Scene):
             faults.append("either [loading] or [programme]")
         if self.programme is not None and self.numerics.force_check is not None:
             faults.append("numerics.force_check with [loading] only (a frame paces a programme)")
+        if self.programme is None:
+            faults += self._faults_of_ends()
         if self.in_situ is not None and self.in_situ.k0 is not None and self.programme is None:
             faults.append("in_situ.k0 with a [programme], which has weight")
         if self.programme is None and d.outline is not None:
@@ -276,3 +278,20 @@ class BlocksScene(Scene):
         if faults:
             raise ValueError("; ".join(faults))
         return self
+
+    def _faults_of_ends(self) -> list[str]:
+        """What platens and supports cannot be together with."""
+        platens, zones = self.loading.platens, self.rock.zones
+        faults = []
+        if self.numerics.force_check is not None and (platens is not None or self.loading.supports):
+            held = "loading.supports" if platens is None else "loading.platens"
+            faults.append(f"no numerics.force_check with {held}: what they bear would count as inertia")
+        if platens is not None and self.in_situ is not None:
+            faults.append("no in_situ with loading.platens, which press the rock from the start")
+        if platens is not None and platens.young is not None and zones != "elastic":
+            faults.append(f'no loading.platens.young, because rock.zones = "{zones}"')
+        if platens is not None and platens.sides and zones == "mohr-coulomb":
+            faults.append(
+                'no loading.platens.sides, because rock.zones = "mohr-coulomb": they would yield as the rock'
+            )
+        return faults

@@ -10,8 +10,10 @@ from pydantic import model_validator
 
 from graben.schemas.quantities import (
     Acceleration,
+    Angle,
     Frequency,
     Integer,
+    JointStiffness,
     Length,
     Number,
     Pressure,
@@ -40,6 +42,56 @@ _SLOPE_SUPPORTS: Any = [
 _SLOPE_LOADS: Any = [{"name": "backslope", "start": ["55 m", "50 m"], "end": ["60 m", "50 m"], "rate": "0.25 MPa/s"}]
 
 
+class Support(Model):
+    """No displacement along a segment of the outline."""
+
+    name: Name = key("support", "name, for messages")
+    start: Point = key(..., "one end of the segment")
+    end: Point = key(..., "the other end")
+    fix: Literal["x", "y", "both"] = key("both", "displacement held at zero: x or y (a roller), or both")
+
+
+class Platens(Model):
+    """Platens as bodies that touch the rock through contacts without cohesion or tension; they do not turn."""
+
+    friction: Angle = key("0 deg", "friction angle between platen and rock", ge=0, lt=1.57)
+    normal_stiffness: JointStiffness | None = key(
+        None, "normal stiffness of the contact; left out: that of [joints]", gt=0
+    )
+    shear_stiffness: JointStiffness | None = key(
+        None, "shear stiffness of the contact; left out: that of [joints]", gt=0
+    )
+    sides: Switch = key(
+        False,
+        "also at the left and right side, where they pass the confining pressure on; left out: it acts on the rock",
+    )
+    side_friction: Angle | None = key(None, "sides: friction angle there; left out: friction", ge=0, lt=1.57)
+    young: Pressure | None = key(
+        None,
+        "Young's modulus of platens that deform, held at their outer faces; left out: rigid below and above, and "
+        "of the rock's modulus at the sides",
+        gt=0,
+    )
+    poisson: Number | None = key(None, "their Poisson's ratio; left out: 0.3", gt=-1, lt=0.5)
+    thickness: Length | None = key(None, "thickness; left out: a tenth of the smaller side of the domain", gt=0)
+    overhang: Length | None = key(
+        None,
+        "reach beyond the rock at both ends, which bulges; left out: a quarter of the smaller side of the domain",
+        gt=0,
+    )
+
+    @model_validator(mode="after")
+    def _used(self) -> Platens:
+        faults = []
+        if self.side_friction is not None and not self.sides:
+            faults.append("sides = true, because of side_friction")
+        if self.poisson is not None and self.young is None:
+            faults.append("young, because of poisson")
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
+
+
 class Loading(Model):
     """Confinement first, then the top moves down."""
 
@@ -62,6 +114,15 @@ class Loading(Model):
     )
     duration: Time = key("100 s", "time of loading", gt=0)
     states: Integer = key(51, "saved states, the first before loading", ge=2, le=1_000_000)
+    supports: list[Support] = key(
+        [],
+        "what holds the rock instead of rollers below, on segments of its outline (repeatable): parts of the bottom "
+        "along y at least; x holds top or bottom against slip, y a side against settling; the top moves all the same",
+        max_length=10_000,
+    )
+    platens: Platens | None = key(
+        None, "platens as bodies; left out: smooth walls, glued to top and bottom, which hold the rock"
+    )
 
     @property
     def largest_travel(self) -> float:
@@ -97,18 +158,11 @@ class Loading(Model):
                 faults.append("confining_course that begins at 0 s with confining_pressure")
             if any(pressure <= 0.0 for _, pressure in self.confining_course):
                 faults.append("confining_course of positive pressures")
+        if self.supports and self.platens is not None:
+            faults.append("either supports or platens, which hold the rock below")
         if faults:
             raise ValueError("; ".join(faults))
         return self
-
-
-class Support(Model):
-    """No displacement along a segment of the outline."""
-
-    name: Name = key("support", "name, for messages")
-    start: Point = key(..., "one end of the segment")
-    end: Point = key(..., "the other end")
-    fix: Literal["x", "y", "both"] = key("both", "displacement held at zero: x or y (a roller), or both")
 
 
 class Load(Model):

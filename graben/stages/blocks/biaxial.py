@@ -7,12 +7,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from graben.mechanics.blocks.engine.model import BlockModel
-from graben.mechanics.blocks.loading.biaxial import Biaxial, Courses, rectangle_sides
+from graben.mechanics.blocks.loading.biaxial import Biaxial, Courses
 from graben.mechanics.blocks.loading.courses import Course
 from graben.mechanics.blocks.loading.pace import ForceCheck
-from graben.mechanics.blocks.record.history import History, mean_stress
+from graben.mechanics.blocks.record.history import History
+from graben.mechanics.blocks.shape.rectangle import rectangle_sides
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.schemas.scenes.blocks_loading import Loading
+from graben.stages.blocks.confinement import friction_share, lateral_inside
+from graben.stages.blocks.ends import ends_of
 from graben.stages.blocks.report import energy_error, energy_measure, kinetic_measure, kinetic_share, ratio
 from graben.stages.shared.measures import Measure, number
 
@@ -32,6 +35,7 @@ def biaxial(scene: BlocksScene, model: BlockModel, steps: int) -> Biaxial:
         courses=_courses(loading, loading.duration / steps, check is not None),
         stop_loose=numerics.stop_loose_blocks,
         check=check,
+        ends=ends_of(scene, model.bodies),
     )
 
 
@@ -74,7 +78,32 @@ class BiaxialReport:
         if loading.confining_course is not None:
             course = Course(loading.confining_course)
             arrays["confining_stress_then"] = np.array([-course.at(t) for t in history.time])
+        inside = lateral_inside(history)
+        applied = arrays.get("confining_stress_then", np.full(len(inside), arrays["confining_stress"]))
+        arrays["lateral_over_applied_stress"] = inside / applied
+        if self._gripped:
+            arrays["friction_over_confinement"] = friction_share(history, applied)
         return arrays
+
+    @property
+    def _gripped(self) -> bool:
+        """Whether anything but smooth walls may bear on the rock."""
+        return self.scene.loading.platens is not None or bool(self.scene.loading.supports)
+
+    def _reactions(self, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Vertical forces (states,) that the bottom and the sides bear, and that the top brings [N/m]."""
+        sides, push = rectangle_sides(self.model.bodies.outline), arrays["wall_reaction"][:, :, 1]
+        return push[:, sides.bottom], push[:, sides.left] + push[:, sides.right], -push[:, sides.top]
+
+    def _of_friction(self, arrays: dict[str, np.ndarray], upto: slice) -> dict[str, float | None]:
+        """Means of what friction and supports add, where there may be any."""
+        if not self._gripped:
+            return {}
+        _, side, top = self._reactions(arrays)
+        return {
+            "friction_over_confinement": number(arrays["friction_over_confinement"][upto].mean()),
+            "side_over_top_reaction": number(ratio(side, top)[upto].mean()),
+        }
 
     def _strain(self, time: float, height: float) -> float:
         """Nominal strain, compression negative."""
@@ -94,21 +123,13 @@ class BiaxialReport:
 
     def headline(self, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
         """Peak of the top wall's mean stress (Pa, compression negative), nominal strain there, error measures."""
-        sides = rectangle_sides(self.model.bodies.outline)
-        push = arrays["wall_reaction"]
-        low, size = self.model.bodies.outline.min(axis=0), np.ptp(self.model.bodies.outline, axis=0)
-        bottom, top = push[:, sides.bottom, 1], -push[:, sides.top, 1]
+        size = np.ptp(self.model.bodies.outline, axis=0)
+        bottom, side, top = self._reactions(arrays)
         vertical = -top / size[0]
         peak = int(np.argmin(vertical))
-        bodies, area, stress = self.model.bodies, self.model.zone_area, arrays["zone_stress"]
-        middle = arrays["vertex_position"][bodies.zone_vertex].mean(axis=1)
-        inside = np.hypot(*(middle - (low + size / 2.0)).T) < 0.4 * size.min()
-        if "block_stress" in arrays:
-            stress = arrays["block_stress"][:, bodies.zone_block]
-        lateral = mean_stress(stress, area, inside if inside.any() else area > 0.0)[:, 0]
         after = slice(1, peak + 1) if peak > 0 else slice(None)
         flown = self.model.flown_at[np.isfinite(self.model.flown_at)] - (self.model.time - arrays["time"][-1])
-        applied = arrays.get("confining_stress_then", np.full(len(lateral), arrays["confining_stress"]))
+        below = bottom + side if self._gripped else bottom
         return {
             "blocks": len(arrays["block_area"]),
             "confining_stress_pa": float(arrays["confining_stress"]),
@@ -120,9 +141,10 @@ class BiaxialReport:
             "flown_blocks_before_peak": int((flown < arrays["time"][peak]).sum()),
             "energy_error": energy_error(arrays),
             "kinetic_over_stored_energy": number(kinetic_share(arrays)[after].mean()),
-            "lateral_over_applied_stress": number((lateral / applied)[after].mean()),
+            "lateral_over_applied_stress": number(arrays["lateral_over_applied_stress"][after].mean()),
             **self._paced(),
-            "bottom_over_top_reaction": number(ratio(bottom, top)[after].mean()),
+            "bottom_over_top_reaction": number(ratio(below, top)[after].mean()),
+            **self._of_friction(arrays, after),
         }
 
     def measures(self, headline: dict[str, Any]) -> list[Measure]:

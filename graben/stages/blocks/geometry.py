@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault, Refused
-from graben.mechanics.blocks.loading.biaxial import rectangle_sides
 from graben.mechanics.blocks.shape import coverage
 from graben.mechanics.blocks.shape.joint_sets import JointSet, cut_by_sets
 from graben.mechanics.blocks.shape.mending import mend
+from graben.mechanics.blocks.shape.rectangle import rectangle_sides
 from graben.mechanics.blocks.shape.tessellation import Tessellation, voronoi_blocks, without
 from graben.mechanics.plane.local_frame import local_origin
 from graben.mechanics.plane.polygons import signed_area
@@ -106,6 +106,9 @@ def _counted_from(scene: BlocksScene, origin: np.ndarray) -> BlocksScene:
     d, p, s = scene.domain, scene.programme, scene.in_situ
     holes = [shift(hole) for hole in d.holes]
     update: dict[str, Any] = {"domain": d.model_copy(update={"outline": shift(d.outline), "holes": holes})}
+    if scene.loading.supports:
+        held = [segment(support) for support in scene.loading.supports]
+        update["loading"] = scene.loading.model_copy(update={"supports": held})
     if p is not None:
         digs = [dig.model_copy(update={"polygon": shift(dig.polygon)}) for dig in p.excavations]
         parts = {"supports": [segment(v) for v in p.supports], "loads": [segment(v) for v in p.loads]}

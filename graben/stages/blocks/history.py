@@ -18,13 +18,20 @@ from graben.schemas.artifact import read_artifact
 @dataclass(frozen=True)
 class Run:
     """One artifact of blocks: its file, its arrays, its lateral stress (Pa, compression negative), and its seed
-    (-1: not known); flags of blocks that are taken out sooner or later (none: empty)."""
+    (-1: not known); flags of blocks that are taken out sooner or later (none: empty); lateral stress at each state
+    where it changes (else empty)."""
 
     path: Path
     history: History
     confining_stress: float
     seed: int = -1
     removed: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    confining_then: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def over_applied(self, stress: np.ndarray) -> np.ndarray:
+        """Lateral part of stresses (states, 4) over the stress applied to the sides; nan where none is."""
+        applied = self.confining_then if len(self.confining_then) else np.full(len(stress), self.confining_stress)
+        return np.divide(stress[:, 0], applied, out=np.full(len(stress), np.nan), where=applied != 0.0)
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -113,6 +120,7 @@ def read_run(path: Path) -> Run:
         float(data["confining_stress"]),
         int(data.attrs.get("seed", -1)),
         np.asarray(removed.any(axis=0)),
+        _floats(data, "confining_stress_then") if "confining_stress_then" in data else np.zeros(0),
     )
 
 

@@ -9,6 +9,7 @@ from graben.mechanics.blocks.shape.bodies import build_bodies
 from graben.mechanics.blocks.shape.tessellation import Tessellation
 from graben.mechanics.blocks.zones.plastic import Strength
 from graben.schemas.scenes.blocks import BlocksScene
+from graben.stages.blocks.ends import beside, platen_rock, platens_of, with_contacts
 from graben.stages.blocks.joints import joints_of_sets
 
 
@@ -20,8 +21,13 @@ def block_model(scene: BlocksScene, tessellation: Tessellation, steps: int) -> B
     programme = scene.programme
     dt = (scene.loading.duration if programme is None else programme.end) / steps
     gravity = (0.0, 0.0) if programme is None else (programme.horizontal, programme.vertical)
-    bodies = build_bodies(tessellation, scene.tessellation.zone_edge)
+    platens = platens_of(scene)
+    laid_out = tessellation if platens is None else beside(tessellation, platens)
+    bodies = build_bodies(laid_out, scene.tessellation.zone_edge)
     joints, between = joints_of_sets(scene.joints, bodies.edge_set)
+    edge_set = bodies.edge_set
+    if platens is not None:
+        joints, edge_set, between = with_contacts(platens, bodies, joints, between)
     model = BlockModel(
         bodies,
         young=scene.rock.young,
@@ -29,7 +35,7 @@ def block_model(scene: BlocksScene, tessellation: Tessellation, steps: int) -> B
         density=scene.rock.density,
         joint=joints[0],
         more_joints=joints[1:],
-        edge_set=bodies.edge_set,
+        edge_set=edge_set,
         set_between=between,
         rounding=scene.tessellation.rounding,
         dt=dt,
@@ -38,6 +44,7 @@ def block_model(scene: BlocksScene, tessellation: Tessellation, steps: int) -> B
         threads=scene.numerics.threads,
         strength=Strength(*scene.rock.strength) if scene.rock.zones == "mohr-coulomb" else None,
         rigid=scene.rock.zones == "rigid",
+        platen_rock=platen_rock(platens),
     )
     _put_stress_in(scene, model)
     return model

@@ -94,6 +94,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
     headline = report.headline(arrays) | ground.mended
     headline["warnings"] = record.warn(warnings_of(report.measures(headline)))
     arrays = ground.placed(arrays)
+    of_rock = model.bodies.vertex_block[model.masses.first[:-1]] < model.bodies.rock
     record.cost |= {
         "steps": model.steps_done,
         "consolidation_steps": int(test.rest[1]),
@@ -101,8 +102,8 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         "zone_steps": model.steps_done * len(arrays["zone_block"]),
         "contact_searches": model.rebuilds,
         "time_step_s": model.dt,
-        "mass_ratio_median": float(np.median(model.mass_ratio)),
-        "mass_ratio_max": float(model.mass_ratio.max()),
+        "mass_ratio_median": float(np.median(model.mass_ratio[of_rock])),
+        "mass_ratio_max": float(model.mass_ratio[of_rock].max()),
         "consolidation_unbalanced_force_ratio": float(test.rest[0]),
         "largest_overlap_m": max(history.overlap),
         **{name: headline[name] for name in (*report.errors, *_PACED) if name in headline},

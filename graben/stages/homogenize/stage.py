@@ -19,7 +19,7 @@ from graben.schemas.outputs import SERIES, Outputs
 from graben.schemas.vtk import vtu_series
 from graben.stages.blocks.history import Run, read_run
 from graben.stages.shared.last_good import keeps_last_good, write_whole
-from graben.stages.shared.measures import Measure, warnings_of
+from graben.stages.shared.measures import Measure, number, warnings_of
 from graben.stages.shared.record import Progress, Record, silent
 
 Point = tuple[float, float]
@@ -281,6 +281,9 @@ def curve_arrays(jobs: Sequence[tuple[Run, Rev]], averages: Sequence[Average]) -
     }
     for name in (*_TENSORS, *_SCALARS):
         arrays[name] = padded([getattr(a, name) for a in averages])
+    lateral = [j.over_applied(a.stress) for (j, _), a in zip(jobs, averages)]
+    if any(np.isfinite(values).any() for values in lateral):
+        arrays["lateral_over_applied_stress"] = padded(lateral)
     if any(a.balance_residual is not None for a in averages):
         nothing = [np.full(n, np.nan) for n in steps]
         arrays["balance_residual"] = padded(
@@ -327,6 +330,7 @@ def _boundary_difference(a: Average) -> float:
 
 def _headline(name: str, job: tuple[Run, Rev], a: Average) -> dict[str, Any]:
     peak = int(np.argmin(a.stress[:, 1]))
+    lateral = job[0].over_applied(a.stress)[slice(1, peak + 1) if peak > 0 else slice(None)]
     return {
         "name": name,
         "confining_stress_pa": job[0].confining_stress,
@@ -334,6 +338,7 @@ def _headline(name: str, job: tuple[Run, Rev], a: Average) -> dict[str, Any]:
         "blocks": int(a.outline.blocks.sum()),
         "peak_stress_pa": -float(a.stress[peak, 1]),
         "strain_at_peak": -float(a.strain[peak, 1]),
+        "lateral_over_applied_stress": number(lateral.mean()),
         "boundary_stress_difference": _boundary_difference(a),
         "hill_mandel_work": float(a.hill_mandel_work[-1]),
         "strain_closure": a.strain_closure,

@@ -163,6 +163,8 @@ def contact_forces(rows, begin, stop, node, table, joint, deepest, dt, fn, node_
     kn, ks = table[joint, 0], table[joint, 1]
     strengths = (table[joint, 2], table[joint, 3], table[joint, 7], table[joint, 8])
     tensile, dilation, limit, closure = table[joint, 4], table[joint, 5], table[joint, 6], table[joint, 9]
+    face = table[joint, 10]
+    shortest = 1.7 if face == 0.0 else 1.0
     compliance = 1.0 / ks
     ksdt = ks * dt
     friction_work = 0.0
@@ -186,6 +188,10 @@ def contact_forces(rows, begin, stop, node, table, joint, deepest, dt, fn, node_
                 forget(hold, mark, whole_at_start, m)
                 mark[m, LIVE] = 0
             continue
+        if face == 1.0:
+            tx, ty, square = node[e, TX], node[e, TY], 1.0
+        elif face == 2.0:
+            tx, ty, square = -node[f, TX], -node[f, TY], 1.0
         e2 = edge[m, E_END]
         f2 = edge[m, F_END]
         ox = node[e, X]
@@ -197,8 +203,8 @@ def contact_forces(rows, begin, stop, node, table, joint, deepest, dt, fn, node_
         low = max(0.0, s1)
         high = min(se, s0)
         rim = node[e, RIM] + node[f, RIM]
-        # They are stretched by at least sqrt(3).
-        if high - low <= 1.7 * rim:
+        # They are stretched by at least sqrt(3), or not at all.
+        if high - low <= shortest * rim:
             if mark[m, LIVE] == 1:
                 forget(hold, mark, whole_at_start, m)
                 mark[m, LIVE] = 0

@@ -36,6 +36,8 @@ class Joint(NamedTuple):
     joints that are not intact (broken in tension or by slip, or met on the way); below 0: as for intact ones.
     closure: largest closure of a joint that stiffens hyperbolically from normal_stiffness on (Barton and Bandis),
     sigma = kn u / (1 - u / closure), up to STIFFENING times as stiff; 0: linear.
+    face: the edge whose direction the contact takes, 1: the first, 2: the second, of lower and higher number; 0: both
+    alike, as between two blocks. On a platen blocks that turn must not be pushed along.
     """
 
     normal_stiffness: float
@@ -48,6 +50,7 @@ class Joint(NamedTuple):
     residual_friction: float = -1.0
     residual_cohesion: float = -1.0
     closure: float = 0.0
+    face: int = 0
 
     @property
     def weakens(self) -> bool:
@@ -81,14 +84,14 @@ _BEND = 1.0 - STIFFENING**-0.5
 
 
 def joint_table(joints: Sequence[Joint]) -> np.ndarray:
-    """Sets of joints as rows (sets, 10), in the order of `Joint`; residual values filled in."""
+    """Sets of joints as rows (sets, 11), in the order of `Joint`; residual values filled in."""
     rows = []
     for j in joints:
         residual = [max(j.residual_friction, -1.0), max(j.residual_cohesion, -1.0)]
         if j.weakens:
             whole = (j.friction, j.cohesion)
             residual = [r if r >= 0.0 else w for r, w in zip(residual, whole, strict=True)]
-        rows.append([*j[:7], *residual, j.closure])
+        rows.append([*j[:7], *residual, j.closure, j.face])
     return np.array(rows, dtype=float)
 
 
@@ -174,6 +177,10 @@ def contact_state(pairs, follow, node, table, deepest, out, ints, fn):
         scale = 1.0 / np.sqrt(2.0 + 2.0 * facing)
         tx = (node[e, TX] - node[f, TX]) * scale
         ty = (node[e, TY] - node[f, TY]) * scale
+        if table[j, 10] == 1.0:
+            tx, ty = node[e, TX], node[e, TY]
+        elif table[j, 10] == 2.0:
+            tx, ty = -node[f, TX], -node[f, TY]
         ox = node[e, X]
         oy = node[e, Y]
         se = node[e, LENGTH] * (node[e, TX] * tx + node[e, TY] * ty)

@@ -61,6 +61,7 @@ class BlockModel(ModelState):
     more_joints : sets 1, 2, ... beside `joint`, which is set 0; edge_set : (outline edges of the bodies,) set of each
     edge; set_between : (sets, sets) set that holds between edges of two sets, by default the lower of both.
     strength : at which zones yield; None: elastic
+    platen_rock : Young's modulus [Pa] and Poisson's ratio of the platens among the bodies; None: those of the rock
     rigid : blocks do not deform; young, poisson and strength then count for nothing
     threads : more than 1 shares the work out to as many threads, with bitwise the same result.
     """
@@ -84,15 +85,16 @@ class BlockModel(ModelState):
         set_between: np.ndarray | None = None,
         strength: Strength | None = None,
         rigid: bool = False,
+        platen_rock: tuple[float, float] | None = None,
     ) -> None:
         self.joints = self._given_joints = (joint, *more_joints)
         self._factor, self._spared = 1.0, False
         self.joint_table = joint_table(self.joints)
-        rock = self._rock = setup.Rock(young, poisson, density, strength, rigid)
+        rock = self._rock = setup.Rock(young, poisson, density, strength, rigid, platen_rock)
         setup.refuse_unsound(rock, self.joints)
         self.damping = damping or Damping()
         made = setup.zones_and_masses(bodies, rock, self.joints, dt, self.damping.local)
-        given, self._set_of = setup.sets_of_edges(bodies, len(self.joints), edge_set, set_between)
+        given, self._set_of = setup.sets_of_edges(bodies, self.joints, edge_set, set_between)
         self.bodies = bodies
         self.skin = chamfered_skin(bodies, rounding)
         self.parts = cut_into_parts(bodies, self.skin)
@@ -161,6 +163,10 @@ class BlockModel(ModelState):
             self.pairs.key,
             self.pairs.live,
         )
+        if self.bodies.platens:
+            # Platens pass one another: those at the sides reach beyond the ends that move.
+            platen, n = skin.block >= self.bodies.rock, len(skin.block)
+            keys = keys[~(platen[keys // n] & platen[keys % n])]
         if self.removed.any():
             gone = self.removed[skin.block]
             keys = keys[~(gone[keys // len(gone)] | gone[keys % len(gone)])]

@@ -25,6 +25,7 @@ from graben.mechanics.cache_lines import aligned
 class Rock(NamedTuple):
     """Rock of all blocks: young [Pa], poisson, density [kg/m3]; strength at which zones yield, None: elastic;
     rigid : blocks do not deform, the moduli and the strength then count for nothing.
+    platens : young [Pa] and poisson of platens; None: as the others
     """
 
     young: float
@@ -32,6 +33,7 @@ class Rock(NamedTuple):
     density: float
     strength: Strength | None = None
     rigid: bool = False
+    platens: tuple[float, float] | None = None
 
 
 class Made(NamedTuple):
@@ -63,6 +65,9 @@ def zones_and_masses(
     """
     gradient, area = shape_gradients(bodies.position, bodies.zone_vertex)
     lam, mu = (np.full(len(area), c) for c in lame(rock.young, rock.poisson))
+    if rock.platens is not None:
+        of_platens = bodies.zone_block >= bodies.rock
+        lam[of_platens], mu[of_platens] = lame(*rock.platens)
     thirds = np.repeat(rock.density * area / 3.0, 3)
     true_mass = np.bincount(bodies.zone_vertex.ravel(), weights=thirds, minlength=len(bodies.position))
     stiffest = max(max(j.stiffest, j.shear_stiffness) for j in joints)
@@ -94,16 +99,20 @@ def _rigid(
 
 
 def sets_of_edges(
-    bodies: Bodies, count: int, edge_set: np.ndarray | None, set_between: np.ndarray | None
+    bodies: Bodies, joints: Sequence[Joint], edge_set: np.ndarray | None, set_between: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Set of each outline edge, and the set that holds between edges of two sets; as given, checked."""
-    sets = np.arange(count)
+    sets = np.arange(len(joints))
     given = np.zeros(len(bodies.edge_from)) if edge_set is None else np.asarray(edge_set)
     between = np.minimum.outer(sets, sets) if set_between is None else np.asarray(set_between)
     if given.shape != bodies.edge_from.shape or not np.isin(given, sets).all():
         raise Refused(f"edge_set: expected {len(bodies.edge_from)} numbers of joint sets (0 to {sets[-1]})")
-    if between.shape != (len(sets),) * 2 or not np.isin(between, sets).all() or np.any(between != between.T):
-        raise ValueError(f"set_between: expected a symmetric table {len(sets)} x {len(sets)} of joint sets")
+    # A contact with a face has a set for each order of its edges.
+    faced = np.array([j.face > 0 for j in joints])
+    if between.shape != (len(sets),) * 2 or not np.isin(between, sets).all():
+        raise ValueError(f"set_between: expected a table {len(sets)} x {len(sets)} of joint sets")
+    if np.any((between != between.T) & ~faced[between]):
+        raise ValueError("set_between: expected a symmetric table, but for contacts with a face")
     return given.astype(np.int64), np.ascontiguousarray(between, dtype=np.int64)
 
 

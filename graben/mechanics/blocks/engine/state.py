@@ -120,10 +120,10 @@ class ModelState:
         """Forces below this [N/m] are rounding errors of positions."""
         return 1e-12 * max(j.stiffest for j in self.joints) * float(self.bodies.block_area.max())
 
-    def contact_force(self) -> np.ndarray:
-        """Forces (vertices, 2) of all contacts [N/m], from where the blocks are now."""
+    def contact_force(self, among: np.ndarray | None = None) -> np.ndarray:
+        """Forces (vertices, 2) of contacts [N/m], from where the blocks are now; among : as in `contacts`."""
         s, nodal = self.skeleton, np.zeros((len(self.skeleton.first), 2))
-        self.contacts(nodal)
+        self.contacts(nodal, among)
         force = np.zeros_like(self.motion.x)
         scatter_nodes(nodal, s.first, s.second, s.weight, force, 0, len(nodal))
         return force
@@ -161,17 +161,23 @@ class ModelState:
         plastic = z.plastic if isinstance(z, PlasticZones) else None
         return zone_state(self.motion.x, z.triangles, z.gradient, z.area, z.lam, z.mu, plastic)
 
-    def contacts(self, nodal: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, float]:
+    def contacts(
+        self, nodal: np.ndarray | None = None, among: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray, float]:
         """Touching pairs: out (n, 13) and ints (n, 2) as in `joints.contact_state`, and the stored energy [J/m].
 
-        nodal : (contact nodes, 2), their forces, added to [N/m]
+        nodal : (contact nodes, 2), their forces, added to [N/m]; among : flags of the pairs that count, None: all
         """
-        s, m = self.skeleton, self.motion
+        s, m, pairs = self.skeleton, self.motion, self.pairs
         node_motion(m.x, m.v, s.first, s.second, s.weight, s.follow, m.node, 0, len(m.node))
-        n = len(self.pairs.key)
+        if among is not None:
+            pairs = Pairs(*(np.ascontiguousarray(values[among]) if len(values) else values for values in pairs))
+        n = len(pairs.key)
         out, ints = np.zeros((n, 13)), np.zeros((n, 2), dtype=np.int64)
         fn = np.zeros((len(m.node), 2)) if nodal is None else nodal
-        count, stored = contact_state(self.pairs, s.follow, m.node, self.joint_table, self.deepest, out, ints, fn)
+        count, stored = contact_state(pairs, s.follow, m.node, self.joint_table, self.deepest, out, ints, fn)
+        if among is not None:
+            ints[:count, 0] = np.flatnonzero(among)[ints[:count, 0]]
         return out[:count], ints[:count], stored
 
     def loose_blocks(self) -> np.ndarray:

@@ -10,30 +10,13 @@ import numpy as np
 from graben.errors import Refused
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.courses import Course
+from graben.mechanics.blocks.loading.ends import Ends, Walls
 from graben.mechanics.blocks.loading.pace import ForceCheck, Pace
 from graben.mechanics.blocks.loading.protocol import Moment, State, refuse_unlike
 from graben.mechanics.blocks.loading.rest import settle
 
 # Steps between two looks for loose blocks.
 _LOOSE_EVERY = 250
-
-
-@dataclass(frozen=True)
-class Sides:
-    """Sides of the outline by their direction: indices of bottom, right, top and left."""
-
-    bottom: int
-    right: int
-    top: int
-    left: int
-
-
-def rectangle_sides(outline: np.ndarray) -> Sides:
-    """Sides of an upright rectangle (4, 2), counter-clockwise; Refused for anything else."""
-    d = np.roll(outline, -1, axis=0) - outline
-    if len(outline) != 4 or np.any(np.abs(d[:, 0] * d[:, 1]) > 1e-6 * np.abs(d).max() ** 2):
-        raise Refused("an upright rectangle as domain of biaxial compression")
-    return Sides(int(np.argmax(d[:, 0])), int(np.argmax(d[:, 1])), int(np.argmin(d[:, 0])), int(np.argmin(d[:, 1])))
 
 
 def consolidate(
@@ -44,19 +27,16 @@ def consolidate(
     tolerance: float = 1e-3,
     chunk: int = 250,
     limit: int = 20000,
+    ends: Ends | None = None,
 ) -> float:
     """Press left and right with `lateral`, the top with `vertical` [Pa, tension positive]; bottom on rollers.
+
+    ends : what grips the rock instead of rollers and a wall
 
     Steps until the unbalanced force falls below `tolerance`; returns the ratio reached. Raises NumericsFailed when
     it does not within `limit` steps. The rising load becomes a pressure of 1 Pa on left and right, for courses.
     """
-    b = model.bodies
-    sides = rectangle_sides(b.outline)
-    model.hold(b.vertex_side[:, sides.bottom], 1)
-    for side in (sides.left, sides.right):
-        model.press(b.edge_side == side, lateral)
-        model.press(b.edge_side == side, -1.0, rising=True)
-    model.press(b.edge_side == sides.top, vertical)
+    (ends or Walls(model.bodies)).grip(model, lateral, vertical)
     advice = "strengthen the joints or lower the confining stress"
     ratios = settle(
         model, tolerance, BlockModel.unbalanced_ratio, limit=limit, where="consolidation", advice=advice, chunk=chunk
@@ -105,6 +85,7 @@ def compress(
     courses: Courses | None = None,
     stop_loose: bool = False,
     paced: tuple[Pace, ForceCheck] | None = None,
+    ends: Ends | None = None,
 ) -> Iterator[int]:
     """Move the top at `speed` [m/s, negative: down] for `steps` steps; gives the number of each of `states` states
     when the model is there.
@@ -112,10 +93,10 @@ def compress(
     State 0 is the start. The speed rises over the first `ramp_share` of the steps. The pressure on the top is
     dropped: the wall now carries it. saved : states that a model brought back from a snapshot has behind it;
     courses : instead of speed and ramp; stop_loose : stop loose blocks every 250 steps, see
-    `BlockModel.calm_loose_blocks`; paced : courses are followed as fast as forces allow, in the model's time
+    `BlockModel.calm_loose_blocks`; paced : courses are followed as fast as forces allow, in the model's time;
+    ends : as in `consolidate`
     """
-    b, sides = model.bodies, rectangle_sides(model.bodies.outline)
-    top = b.vertex_side[:, sides.top]
+    ends = ends or Walls(model.bodies)
     if courses is not None:
         speed = courses.fastest * (1.0 if paced is None else paced[1].fastest)
     if saved == 0:
@@ -123,8 +104,7 @@ def compress(
         yield 0
         saved = 1
     if saved == 1:
-        model.take_off_steady(top, 1)
-        model.hold(top, 1, speed)
+        ends.take_over(model, speed)
         model.set_speed(0.0, 1.0 / max(1.0, ramp_share * steps))
     for k in range(saved, states):
         begin, end = (round(steps * j / (states - 1)) for j in (k - 1, k))
@@ -141,7 +121,7 @@ def compress(
                 model.calm_loose_blocks()
             if paced is not None:
                 model.add_time((rate - 1.0) * taken * model.dt)
-                paced[0].look(model, paced[1], b.vertex_side[:, sides.bottom], top)
+                paced[0].look(model, paced[1], ends.bottom, ends.top)
         yield k
 
 
@@ -150,6 +130,7 @@ class Biaxial:
 
     pressure : on left and right, and vertical on the top until the wall takes over [Pa, tension positive]
     check : of forces; the loading then follows it, at a pace of its own
+    ends : what grips the rock; rollers below and a wall above unless given
     """
 
     failed = False
@@ -167,8 +148,9 @@ class Biaxial:
         courses: Courses | None = None,
         stop_loose: bool = False,
         check: ForceCheck | None = None,
+        ends: Ends | None = None,
     ) -> None:
-        rectangle_sides(model.bodies.outline)  # refuses any other outline before work begins
+        self.ends = ends or Walls(model.bodies)  # refuses any other outline before work begins
         self.model = model
         self.rest: np.ndarray = np.zeros(2)
         self.pace = None if check is None else Pace()
@@ -181,7 +163,7 @@ class Biaxial:
         """Consolidate."""
         yield Moment(0.0, "consolidation")
         self.model.spare_joints(True)
-        ratio = consolidate(self.model, *self._pressures, tolerance=self._tolerance)
+        ratio = consolidate(self.model, *self._pressures, tolerance=self._tolerance, ends=self.ends)
         self.model.spare_joints(False)
         self.rest = np.array([ratio, self.model.steps_done])
 
@@ -197,6 +179,7 @@ class Biaxial:
             courses=self._courses,
             stop_loose=self._stop_loose,
             paced=None if self.pace is None or self._check is None else (self.pace, self._check),
+            ends=self.ends,
         )
         for k in moments:
             self._saved = k + 1

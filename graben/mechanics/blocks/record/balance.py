@@ -25,11 +25,16 @@ class Balance(NamedTuple):
     overlap_moment: np.ndarray
 
 
-def balance(model: BlockModel, zone_stress: np.ndarray, boundary_force: np.ndarray) -> Balance:
-    """Balance of the present state. zone_stress : (zones, 4) [Pa]; boundary_force : (vertices, 2) [N/m]."""
+def balance(
+    model: BlockModel, zone_stress: np.ndarray, boundary_force: np.ndarray, among: np.ndarray | None = None
+) -> Balance:
+    """Balance of the present state. zone_stress : (zones, 4) [Pa]; boundary_force : (vertices, 2) [N/m].
+
+    among : flags of the pairs that are joints, None: all; what the others do is among the boundary forces
+    """
     b, s, x = model.bodies, model.skeleton, model.motion.x
     nodal = np.zeros((len(s.first), 2))
-    out, ints, _ = model.contacts(nodal)
+    out, ints, _ = model.contacts(nodal, among)
     joint = np.zeros_like(x)
     scatter_nodes(nodal, s.first, s.second, s.weight, joint, 0, len(nodal))
     body = zone_pull(x, b.zone_vertex, zone_stress) - joint - boundary_force

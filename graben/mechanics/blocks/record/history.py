@@ -9,6 +9,7 @@ import numpy as np
 from graben.errors import Refused
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.record.balance import balance
+from graben.mechanics.blocks.record.rock_part import RockPart, on_sides
 
 ENERGIES = (
     "kinetic",
@@ -28,13 +29,17 @@ class History:
     """Collects states of a model; the first one is the reference for displacements.
 
     model : the model; balanced : keep what closes the balance of forces, too, see `balance`
+    rock : the part that is kept of a model with platens; None: all of it. Each state then has the moments
+    (1, platens) of the forces of platens on it along x about its middle [N], as `platen_spread`.
     """
 
     def __init__(self, model: BlockModel, balanced: bool = False) -> None:
         self.model = model
         self.optional = ("body_force", "overlap_moment") if balanced else ()
         self.start_time = model.time
-        self.reference = model.motion.x.copy()
+        self.rock = RockPart(model.bodies) if model.bodies.platens else None
+        self._vertices: Any = slice(None) if self.rock is None else self.rock.vertex
+        self.reference = model.motion.x[self._vertices].copy()
         self.time: list[float] = []
         self.rows: dict[str, list[np.ndarray]] = {
             name: []
@@ -52,6 +57,7 @@ class History:
                 "loose",
                 "removed",
                 *self.optional,
+                *(() if self.rock is None else ("platen_spread",)),
             )
         }
         self.overlap: list[float] = []
@@ -61,16 +67,26 @@ class History:
         """Append the present state."""
         m, b = self.model, self.model.bodies
         self.time.append(m.time - self.start_time)
-        out, ints, _ = m.contacts()
+        rock, there = self.rock, self._vertices
+        among = None if rock is None else rock.pairs(m)
+        out, ints, _ = m.contacts(among=among)
         energy = m.energies()
         force = m.boundary_force()
+        reaction = side_forces(force, b.vertex_side, b.outline)
+        if rock is not None:
+            by_platen = rock.platen_forces(m)
+            reaction += on_sides(by_platen, b.outline)
+            spread = (by_platen[:, there, 0] @ (m.motion.x[there, 0] - m.motion.x[there, 0].mean()))[None]
+            self.rows["platen_spread"].append(spread)
+            force += by_platen.sum(axis=0)
         rows = self.rows
-        rows["displacement"].append(m.motion.x - self.reference)
-        rows["velocity"].append(m.motion.v.copy())
-        for name, value in m.state_of_blocks().items():
+        rows["displacement"].append(m.motion.x[there] - self.reference)
+        rows["velocity"].append(m.motion.v[there].copy())
+        state = m.state_of_blocks() if rock is None else rock.state_of_blocks(m)
+        for name, value in state.items():
             rows[name].append(value)
-        rows["boundary_force"].append(force)
-        rows["wall_reaction"].append(side_forces(force, b.vertex_side, b.outline))
+        rows["boundary_force"].append(force[there])
+        rows["wall_reaction"].append(reaction)
         rows["energy"].append(np.array([energy[k] for k in ENERGIES]))
         rows["contact"].append(out)
         pair = ints[:, 0]
@@ -79,11 +95,13 @@ class History:
         rows["contact_state"].append(ints[:, 1])
         rows["contact_set"].append(m.pairs.joint[pair])
         loose = m.loose_blocks()
-        rows["loose"].append(np.array([[np.count_nonzero(loose), m.kinetic_energy(loose)]]))
-        rows["removed"].append(m.removed.copy())
+        rows["loose"].append(np.array([[np.count_nonzero(loose[: b.rock]), m.kinetic_energy(loose)]]))
+        rows["removed"].append(m.removed[: b.rock].copy())
         if self.optional:
-            for name, values in balance(m, rows["zone_stress"][-1], force)._asdict().items():
-                rows[name].append(values)
+            stress = rows["zone_stress"][-1] if rock is None else m.zone_stress()
+            closed = balance(m, stress, force, among)
+            rows["body_force"].append(closed.body_force[there])
+            rows["overlap_moment"].append(closed.overlap_moment[: b.rock])
         self.overlap.append(m.largest_overlap)
         self.damping.append(m.damping_coefficient)
 
@@ -126,7 +144,7 @@ class History:
             varies = name.startswith("contact")
             if (sizes < 0).any() or sizes.sum() != length or not (varies or (sizes == len(rows[0])).all()):
                 raise Refused(f"history.{name}.sizes: those of its rows")
-        pair, blocks = stored["contact_pair.rows"], len(self.model.bodies.block_area)
+        pair, blocks = stored["contact_pair.rows"], self.model.bodies.rock
         if pair.size and (pair.min() < 0 or pair.max() >= blocks):
             raise Refused(f"history.contact_pair: blocks 0 to {blocks - 1}")
         if (np.diff(stored["time"]) <= 0.0).any():
@@ -143,16 +161,21 @@ class History:
         """Arrays of all saved states, named as in the artifact; contacts are ragged over time."""
         b, rows = self.model.bodies, self.rows
         contact = np.vstack(rows["contact"])
+        zone_vertex, zone_block, corner = b.zone_vertex, b.zone_block, b.block_corner
+        if self.rock is not None:
+            number, zone = self.rock.number, self.rock.zone
+            zone_vertex, zone_block = number[zone_vertex[zone]], zone_block[zone]
+            corner = number[corner[: b.block_start[b.rock]]]
         zoned = "zone_stress" in rows
         result = {
             "time": np.array(self.time),
             "vertex_position": self.reference,
-            "vertex_block": b.vertex_block,
-            "zone_vertex": b.zone_vertex if zoned else b.zone_vertex[:0],
-            "zone_block": b.zone_block if zoned else b.zone_block[:0],
-            "block_area": b.block_area,
-            "block_corner_count": np.diff(b.block_start),
-            "block_corner": b.block_corner,
+            "vertex_block": b.vertex_block[self._vertices],
+            "zone_vertex": zone_vertex if zoned else zone_vertex[:0],
+            "zone_block": zone_block if zoned else zone_block[:0],
+            "block_area": b.block_area[: b.rock],
+            "block_corner_count": np.diff(b.block_start[: b.rock + 1]),
+            "block_corner": corner,
             "contact_count": np.array([len(c) for c in rows["contact"]]),
             "contact_block": np.vstack(rows["contact_pair"]),
             "contact_position": contact[:, 0:2],
@@ -168,7 +191,8 @@ class History:
             "loose_blocks": np.vstack(rows["loose"])[:, 0].astype(np.int32),
             "energy_kinetic_loose": np.vstack(rows["loose"])[:, 1],
         }
-        if len(self.model.joints) > 1:
+        # Platens have sets of their own, which no contact of the rock has.
+        if len(self.model.joints) > 1 if self.rock is None else b.edge_set is not None:
             result["contact_set"] = np.concatenate(rows["contact_set"])
         whole = (*self.model.state_of_blocks(), "boundary_force", "wall_reaction", *self.optional)
         for name in ("displacement", "velocity", *whole):

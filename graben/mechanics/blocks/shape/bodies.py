@@ -29,7 +29,8 @@ class Bodies:
     edge_from, edge_to : (outline edges,) vertices of the outline edges, block by block, counter-clockwise
     outline : (m, 2) of the domain [m]; vertex_side : (vertices, m) whether a vertex lies on a side of the domain;
     edge_side : (outline edges,) side of the domain on which an edge lies, -1 for inner ones; edge_set : (outline
-    edges,) its set of joints, None: all of set 0
+    edges,) its set of joints, None: all of set 0; platens : how many of the last blocks are platens beside the
+    outline, which are on none of its sides
     """
 
     position: np.ndarray
@@ -45,6 +46,12 @@ class Bodies:
     vertex_side: np.ndarray
     edge_side: np.ndarray
     edge_set: np.ndarray | None = None
+    platens: int = 0
+
+    @property
+    def rock(self) -> int:
+        """Number of blocks that are no platens."""
+        return len(self.block_area) - self.platens
 
 
 def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> Bodies:
@@ -61,7 +68,7 @@ def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> 
         ring = points[corner[start[b] : start[b + 1]]]
         triangles = ear_clip(ring)
         k = 1
-        if zone_edge is not None:
+        if zone_edge is not None and b < tessellation.size - tessellation.platens:
             sides = ring[triangles] - ring[np.roll(triangles, 1, axis=1)]
             k = max(1, int(np.ceil(np.linalg.norm(sides, axis=2).max() / zone_edge - 1e-9)))
         xy, tri, loop = _split(ring, triangles, k)
@@ -78,6 +85,7 @@ def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> 
     block = np.concatenate(owner)
     tolerance = 1e-6 * float(np.ptp(tessellation.outline, axis=0).max())
     on_side = distance_to_sides(x, tessellation.outline) < tolerance
+    on_side[block >= tessellation.size - tessellation.platens] = False
     both = on_side[edge[:, 0]] & on_side[edge[:, 1]]
     edge_side = np.where(both.any(axis=1), both.argmax(axis=1), -1)
     zone_vertex = np.vstack(zones)
@@ -98,6 +106,7 @@ def build_bodies(tessellation: Tessellation, zone_edge: float | None = None) -> 
         vertex_side=on_side,
         edge_side=edge_side,
         edge_set=np.concatenate(sets) if sets else None,
+        platens=tessellation.platens,
     )
 
 

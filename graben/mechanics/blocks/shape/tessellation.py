@@ -62,7 +62,8 @@ class Tessellation:
 
     points : (p, 2) [m]; start : (blocks + 1,); corner : indices into points, counter-clockwise per block;
     outline : (m, 2) [m] counter-clockwise; edge_set : (corners,) set of joints of the edge from each corner to the
-    next, None: all of set 0; mending : what was moved to make blocks of given or cut polygons.
+    next, None: all of set 0; mending : what was moved to make blocks of given or cut polygons; platens : how many of
+    the last blocks are platens beside the outline.
     """
 
     points: np.ndarray
@@ -71,6 +72,7 @@ class Tessellation:
     outline: np.ndarray
     edge_set: np.ndarray | None = None
     mending: Mending | None = None
+    platens: int = 0
 
     @property
     def rings(self) -> list[list[int]]:

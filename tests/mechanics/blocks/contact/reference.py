@@ -17,7 +17,7 @@ def pair_force(points_e, points_f, velocity_e, velocity_f, shear, slip, joint, d
     facing = -te @ tf
     if facing <= FACING_NONE:
         return fe, ff, np.zeros(2), slip
-    t = (te - tf) / np.linalg.norm(te - tf)
+    t = (te, -tf)[joint.face - 1] if joint.face else (te - tf) / np.linalg.norm(te - tf)
     n = np.array([t[1], -t[0]])
     low = max(points_e[0] @ t, points_f[1] @ t)
     high = min(points_e[1] @ t, points_f[0] @ t)
@@ -55,13 +55,16 @@ def pair_force(points_e, points_f, velocity_e, velocity_f, shear, slip, joint, d
     return fe, ff, shear, slip
 
 
-def shared_interval(points_e, points_f):
-    """Length that two edges share along their common tangent, 0 if turned away, and the smaller gap at its ends."""
+def shared_interval(points_e, points_f, face=0):
+    """Length that two edges share along their common tangent, 0 if turned away, and the smaller gap at its ends.
+
+    face : 1, 2: along edge e or f instead
+    """
     te = (points_e[1] - points_e[0]) / np.linalg.norm(points_e[1] - points_e[0])
     tf = (points_f[1] - points_f[0]) / np.linalg.norm(points_f[1] - points_f[0])
     if -te @ tf <= FACING_NONE:
         return 0.0, np.inf
-    t = (te - tf) / np.linalg.norm(te - tf)
+    t = (te, -tf)[face - 1] if face else (te - tf) / np.linalg.norm(te - tf)
     n = np.array([t[1], -t[0]])
     low = max(points_e[0] @ t, points_f[1] @ t)
     high = min(points_e[1] @ t, points_f[0] @ t)

@@ -37,8 +37,10 @@ def one_pair(shear, slip):
     )
 
 
+@pytest.mark.parametrize("face", [0, 1, 2])
 @pytest.mark.parametrize("seed", range(40))
-def test_kernel_against_reference(seed):
+def test_kernel_against_reference(seed, face):
+    joint = JOINT._replace(face=face)
     rng = np.random.default_rng(seed)
     # Edge e runs along x with its block above; edge f below runs back, turned by up to 55 degrees.
     angle = np.radians(rng.uniform(-55, 55)) if seed % 2 else np.radians(rng.uniform(-3, 3))
@@ -59,13 +61,13 @@ def test_kernel_against_reference(seed):
     forces.fill_row(rows, 0, pairs, 0, follow, 0)
     # The second edge may belong to another part: then its forces wait in `far`.
     end = 4 if seed % 3 else 2
-    bad = forces.contact_forces(rows, 0, 1, node, joints.joint_table([JOINT]), 0, 1.0, dt, force, end, far, sums)
+    bad = forces.contact_forces(rows, 0, 1, node, joints.joint_table([joint]), 0, 1.0, dt, force, end, far, sums)
     forces.settle_rows(rows, 0, 1, pairs)
     assert np.any(force[2:]) != np.any(far) or not np.any(force)
     force[2:] += far.reshape(2, 2)
     assert bad == -1
     fe, ff, new_shear, new_slip = pair_force(
-        points[:2], points[2:], velocity[:2], velocity[2:], shear, slip, JOINT, dt
+        points[:2], points[2:], velocity[:2], velocity[2:], shear, slip, joint, dt
     )
     assert force == pytest.approx(np.vstack([fe, ff]), rel=1e-9, abs=1e-3)
     assert pairs.shear[0] == pytest.approx(new_shear, rel=1e-9, abs=1e-6)
@@ -101,6 +103,28 @@ def test_pairs_cannot_bear_before_they_have_moved_as_far_as_is_safe(seed):
             length, gap = shared_interval(moved[:2, :2], moved[2:, :2])
             assert length <= 2 * node[0, nodes.RIM] or gap >= held
     assert len(kinds) > 1
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_safe_way_holds_on_a_face_too(seed):
+    """On a long face, as platens have, contacts are judged along the face; the bound on sleeping knows no faces."""
+    rng = np.random.default_rng(seed)
+    follow = np.array([1, 0, 3, 2])
+    for _ in range(200):
+        short, angle = rng.uniform(0.04, 0.5), np.radians(rng.uniform(-75, 75))
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        middle = [rng.uniform(0.5, 4.5), -rng.uniform(-0.01, 0.05)]
+        block = np.array([(short / 2, 0), (-short / 2, 0)]) @ turn + middle
+        points = np.vstack([[(0.0, 0.0), (5.0, 0.0)], block])
+        _, room = sleeping.safe_motion(0, 2, 3, node_table(points, np.zeros((4, 2)), follow), 0.0)
+        if room <= 0.0:
+            continue
+        for _ in range(20):
+            share, way = rng.uniform(0, 1), rng.standard_normal((4, 2))
+            way *= (room * np.array([share, share, 1 - share, 1 - share]) / np.hypot(*way.T))[:, None]
+            moved = points + way
+            length, gap = shared_interval(moved[:2], moved[2:], face=1)
+            assert length <= 0.0 or gap >= 0.0
 
 
 def test_search_finds_what_brute_force_finds():

@@ -6,10 +6,11 @@ import pytest
 from graben.errors import NumericsFailed
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
-from graben.mechanics.blocks.loading.biaxial import compress, consolidate, rectangle_sides
+from graben.mechanics.blocks.loading.biaxial import compress, consolidate
 from graben.mechanics.blocks.record.history import History, mean_stress
 from graben.mechanics.blocks.shape import partition
 from graben.mechanics.blocks.shape.bodies import build_bodies
+from graben.mechanics.blocks.shape.rectangle import rectangle_sides
 from graben.mechanics.blocks.shape.tessellation import from_polygons, voronoi_blocks
 
 

@@ -5,7 +5,6 @@ import pytest
 
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
-from graben.mechanics.blocks.loading.biaxial import rectangle_sides
 from graben.mechanics.blocks.loading.excavation import blocks_in
 from graben.mechanics.blocks.loading.in_situ import InSitu, put_in
 from graben.mechanics.blocks.loading.rest import imbalance
@@ -13,6 +12,7 @@ from graben.mechanics.blocks.record import snapshot
 from graben.mechanics.blocks.shape.bodies import build_bodies
 from graben.mechanics.blocks.shape.joint_sets import JointSet, cut_by_sets
 from graben.mechanics.blocks.shape.mending import mend
+from graben.mechanics.blocks.shape.rectangle import rectangle_sides
 from graben.mechanics.blocks.shape.tessellation import from_polygons, voronoi_blocks
 
 SQUARE = np.array([(0, 0), (4, 0), (4, 4), (0, 4)], dtype=float)

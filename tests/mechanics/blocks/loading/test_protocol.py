@@ -8,6 +8,7 @@ from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.biaxial import Biaxial, Courses
 from graben.mechanics.blocks.loading.courses import Course
+from graben.mechanics.blocks.loading.ends import Platens
 from graben.mechanics.blocks.loading.excavation import Dig
 from graben.mechanics.blocks.loading.holds import Holds
 from graben.mechanics.blocks.loading.loads import Loads, on_segment, pressure_forces
@@ -15,6 +16,7 @@ from graben.mechanics.blocks.loading.pace import ForceCheck
 from graben.mechanics.blocks.loading.programme import Control, Programme
 from graben.mechanics.blocks.record import snapshot
 from graben.mechanics.blocks.shape.bodies import build_bodies
+from graben.mechanics.blocks.shape.platens import PlatenShape, with_platens
 from graben.mechanics.blocks.shape.tessellation import voronoi_blocks
 
 SQUARE = np.array([(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)])
@@ -39,6 +41,19 @@ def paced():
     return Biaxial(
         blocks(), pressure=-5e5, vertical=-2.5e5, speed=-3e-4, steps=600, states=4, courses=courses, check=check
     )
+
+
+def between_platens():
+    """Blocks between rough platens, also at the sides, of which the top one moves."""
+    shape = PlatenShape(0.5, 0.5, sides=True)
+    bodies = build_bodies(with_platens(voronoi_blocks(SQUARE, 0.5, seed=2), shape))
+    of_platens = bodies.vertex_block[bodies.edge_from] >= bodies.rock
+    faces = [Joint(1e10, 1e9, 0.3, 0.0, 0.0, 0.0, np.inf, face=k) for k in (1, 2)]
+    model = BlockModel(
+        bodies, young=65e9, poisson=0.2, density=2700.0, joint=GRANITE, rounding=0.05, dt=1e-2, more_joints=faces,
+        edge_set=of_platens.astype(int), set_between=np.array([[0, 2, 0], [1, 0, 0], [0, 0, 0]]),
+    )  # fmt: skip
+    return Biaxial(model, pressure=-5e5, vertical=-2.5e5, speed=-3e-4, steps=600, states=4, ends=Platens(bodies))
 
 
 def pressed(rate):
@@ -70,7 +85,7 @@ def end_of(test):
     return [(moment, kept(test) if moment.save else None) for moment in test.run()]
 
 
-@pytest.mark.parametrize("make", [steady, paced, dug, bracketed])
+@pytest.mark.parametrize("make", [steady, paced, between_platens, dug, bracketed])
 def test_a_test_goes_on_bitwise_from_every_saved_moment(make):
     straight = make()
     for moment in straight.begin():
