@@ -55,8 +55,9 @@ def _refuse_unfit(scene: BlocksScene, extent: Extent) -> None:
     """What the scene asks of a map whose size nobody knew when the scene was read."""
     t, file, faults = scene.tessellation, str(scene.source.path), []
     side = min(extent.width, extent.height)
-    if t.edge > 0.5 * side:
-        expected = f"at most half of the smaller side of the map, {side:.6g} m"
+    # A map may be a single row of blocks; blocks that are made need room to be made.
+    if t.edge > side:
+        expected = f"at most the smaller side of the map, {side:.6g} m"
         faults.append(Fault(file, "tessellation.edge", f"{t.edge:.4g} m", expected))
     travel = scene.loading.largest_travel
     if scene.programme is None and travel > 0.5 * extent.height:

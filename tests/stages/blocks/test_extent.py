@@ -54,9 +54,14 @@ def test_a_map_of_any_size_is_a_good_scene(tmp_path, size, kind):
     assert count["blocks"] == 6.0 and count["zones"] == pytest.approx(54.0)
 
 
+def test_a_map_may_be_one_row_of_blocks(tmp_path):
+    path = scene(tmp_path, 3.0, edge=2.0, loading=PROGRAMME.format(3.0))
+    assert prepare(load_scene(path, "blocks")).ground.blocks.size == 6
+
+
 @pytest.mark.parametrize("size", [0.03, 3.0, 3000.0])
 def test_what_does_not_fit_the_map_is_refused_by_key_and_size(tmp_path, size):
-    path = scene(tmp_path, size, edge=0.34 * size, loading=PRESSED.format(0.4e-2 * size))
+    path = scene(tmp_path, size, edge=0.67 * size, loading=PRESSED.format(0.4e-2 * size))
     with pytest.raises(BadInput) as refused:
         prepare(load_scene(path, "blocks"))
     found = {fault.key: fault.expected for fault in refused.value.faults}
