@@ -49,6 +49,11 @@ class Course:
         """Whether it ever leaves its first value."""
         return self._rate != 0.0 or bool(np.any(self.values != self.values[0]))
 
+    @property
+    def acts(self) -> bool:
+        """Whether it is ever other than nothing."""
+        return self._rate != 0.0 or bool(np.any(self.values != 0.0))
+
     def next_point(self, time: float) -> float:
         """Time of the next point; infinite after the last."""
         k = int(np.searchsorted(self.times, time, side="right"))

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from graben.mechanics.blocks.engine.model import BlockModel
+from graben.mechanics.blocks.shape.bodies import Bodies
 
 # Shares of the forces on a block that inertia and damping take up: in balance below the first, out of it above the
 # second; in the mean in balance below the third, and beyond doubt out of it above the fourth. They are small since
@@ -25,6 +26,9 @@ _LOOKS, _MEAN = 10, 500.0
 # A block has fallen when it moved by this share of its size without balance. When a body is put under its weight all
 # blocks move at first: those that never were in balance, and that others bear, may move by their size.
 _GONE, _PLACED = 0.1, 1.0
+
+# A block under a load must not go as far again as it had come, or by this share of its size where that is more.
+_SLID = 0.001
 
 # Where the body as a whole fails, blocks without balance fail with it that moved this share of the farthest way.
 _WITH_IT = 0.5
@@ -117,6 +121,23 @@ class Falling:
         """Shares (blocks,) of the forces on blocks that inertia and damping take up in the mean over some steps."""
         return model.block_share(self._resisted)
 
+    def all_fell(self, model: BlockModel) -> bool:
+        """Whether no block stands that could fall: none of those that nothing holds and that are there."""
+        held = np.zeros(len(self._size), dtype=bool)
+        held[model.bodies.vertex_block[model.held.any(axis=1)]] = True
+        free = ~held & ~model.removed
+        return bool(free.any() and (self.fallen[free, 3] >= 0).all())
+
+    def slid(self, model: BlockModel, share: float) -> np.ndarray:
+        """Blocks (flags) that lost their balance beyond doubt and then went on as far again as they had come.
+
+        share : of the way from where the block was laid out to where it stood last; a small part of its size at least
+        """
+        b, centre = model.bodies, self._centres(model)
+        came = np.hypot(*(self._stood - _middles(b, b.position)).T)
+        went = np.hypot(*(centre - self._from).T)
+        return (self._stretches[3].since >= 0) & (went > np.maximum(share * came, _SLID * self._size)) & ~model.removed
+
     def fail(self, model: BlockModel) -> None:
         """The body as a whole has failed: blocks that are going with it have fallen."""
         going = (self._stretches[1].since >= 0) & (self.fallen[:, 3] < 0) & ~model.removed
@@ -151,10 +172,9 @@ class Falling:
             return Onset(block, steady, lost, lost, _STEADY / _LOST)
         return Onset(block, balanced, out, lost, _BALANCE / _OUT)
 
-    def _centres(self, model: BlockModel) -> np.ndarray:
-        block, count = model.bodies.vertex_block, len(model.bodies.block_area)
-        total = np.column_stack([np.bincount(block, x, count) for x in model.motion.x.T])
-        return total / np.bincount(block, minlength=count)[:, None]
+    @staticmethod
+    def _centres(model: BlockModel) -> np.ndarray:
+        return _middles(model.bodies, model.motion.x)
 
     def state(self) -> dict[str, np.ndarray]:
         """What a saved state must hold."""
@@ -186,3 +206,10 @@ class Falling:
         self._went, self._mark = state["fallen_went"].copy(), int(state["fallen_mark"])
         self._marked, self._way = state["fallen_marked"].copy(), state["fallen_way"].copy()
         self._as_far = state["fallen_as_far"].copy()
+
+
+def _middles(bodies: Bodies, x: np.ndarray) -> np.ndarray:
+    """Mean position (blocks, 2) of the vertices of each block, at x (vertices, 2) [m]."""
+    block, count = bodies.vertex_block, len(bodies.block_area)
+    total = np.column_stack([np.bincount(block, axis, count) for axis in x.T])
+    return total / np.bincount(block, minlength=count)[:, None]

@@ -38,7 +38,7 @@ class Holds(Programme):
         super().__init__(*arguments, **options)
         self.steps, self.width, self.weaken = steps, width, weaken
         self.low, self.high, self.tried = (_STRONG if weaken else 0.0), np.inf, False
-        self.last, self.tries, self._fallen = (_WEAK if weaken else self.end), 0, 0
+        self.last, self.tries, self._fallen, self._slid = (_WEAK if weaken else self.end), 0, 0, False
         if weaken:
             self.model.weaken(self.low)
 
@@ -98,7 +98,7 @@ class Holds(Programme):
     def _try(self, target: float) -> Iterator[Moment]:
         """Go there from where the body rests, and hold."""
         rise, start = self.rise, self.rise.load_time
-        self.at_rest, self._fallen = False, len(self.falling.blocks)
+        self.at_rest, self._fallen, self._slid = False, len(self.falling.blocks), False
         share = _FIRST if self.weaken else (target - start) / self.end
         chunks = max(_LEAST, round(share * self.steps)) // HOLD + 1
         for k in range(chunks):
@@ -113,8 +113,8 @@ class Holds(Programme):
             yield self._moment(save=False)._replace(words=words)
 
     def _over(self) -> bool:
-        """Whether a block fell in this try."""
-        return not self.may_fall and len(self.falling.blocks) > self._fallen
+        """Whether blocks fell in this try that are a failure, or the loaded ground went on."""
+        return self._slid or (len(self.falling.blocks) > self._fallen and self._ends())
 
     def _load(self, share: float, start: float, target: float) -> None:
         """Loads, or strength, at a share of the way from start to target; loads get there by even steps."""
@@ -131,8 +131,22 @@ class Holds(Programme):
 
     def _look(self, *, steady: bool = False) -> None:
         super()._look(steady=steady)
+        slid = self.falling.slid(self.model, self.control.beyond) & self._ground()
+        self._slid = self._slid or bool(slid.any())
         # Whether a try failed is known at its end.
         self.rise.failed = self.rise.fell = False
+
+    def _ground(self) -> np.ndarray:
+        """Blocks (flags) that must not go as far again as they had come, though they may rest further on.
+
+        It is the ground under the loads that change, as where they rise; where none does, that under all pressures;
+        and where weight alone acts all blocks bear the load, unless they may fall.
+        """
+        if self.loads.direction.any():
+            return self._under(self.loads.direction.any(axis=1))
+        if self.loads.pressed.any():
+            return self._under(self.loads.pressed)
+        return np.full(len(self.falling.fallen), not self.may_fall)
 
     def failure(self) -> Failure | None:
         """The bracket, and its middle."""

@@ -36,7 +36,7 @@ class Programme:
 
     end : load time at which the rise is complete, save_every : load time between saved states [s]
     tolerance : of `imbalance` at rest
-    may_fall : whether blocks may fall without ending the test
+    may_fall : whether blocks may fall without ending the test, but for those under loads, and for the last one
     set_in : steps over which weight and steady pressures grow at first; 0: they are there, as stress in situ wants
     looks : (load time [s], settlement [m], imbalance, way, resisted, step) after every chunk, see `Rise`;
     load_times : of saved states [s]; first_look : the first since rates of loads last changed
@@ -84,7 +84,7 @@ class Programme:
         advice = "the body does not stand; strengthen the joints or support it"
         for ratio in settle(m, self.tolerance, self._settling, limit=100_000, where=where, advice=advice):
             yield Moment(0.0, f"coming to rest, {m.steps_done} steps, unbalanced force ratio {ratio:.2g}")
-            if len(self.falling.blocks) and not self.may_fall:
+            if len(self.falling.blocks) and self._ends():
                 self.rise.failed = self.rise.fell = True
                 break
         m.spare_joints(False)
@@ -206,11 +206,24 @@ class Programme:
         self.looks.append(look)
         if rise.load_time >= rise.largest:
             self.carried = model.motion.x.copy()
-        if self.falling.look(model, self.resistance.force, steady=steady) and not self.may_fall:
+        if self.falling.look(model, self.resistance.force, steady=steady) and self._ends():
             rise.failed = rise.fell = True
         elif rise.failed:
             self.falling.fail(model)
         self.resistance.counted = (self.falling.fallen[:, 3] < 0)[model.bodies.vertex_block]
+
+    def _ends(self) -> bool:
+        """Whether the blocks that fell are a failure of the body: any, or where they may fall, those that bear."""
+        return not self.may_fall or self._loaded_fell() or self.falling.all_fell(self.model)
+
+    def _loaded_fell(self) -> bool:
+        return bool((self.falling.fallen[self._under(self.loads.pressed), 3] >= 0).any())
+
+    def _under(self, vertices: np.ndarray) -> np.ndarray:
+        """Blocks (flags) of vertices (flags)."""
+        blocks = np.zeros(len(self.falling.fallen), dtype=bool)
+        blocks[self.model.bodies.vertex_block[vertices]] = True
+        return blocks
 
     def look_table(self) -> np.ndarray:
         """The looks as rows (looks, 6)."""
