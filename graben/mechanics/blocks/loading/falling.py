@@ -27,7 +27,8 @@ _LOOKS, _MEAN = 10, 500.0
 # blocks move at first: those that never were in balance, and that others bear, may move by their size.
 _GONE, _PLACED = 0.1, 1.0
 
-# A block under a load must not go as far again as it had come, or by this share of its size where that is more.
+# A block under a load has fallen where it goes as far again as it had come, or by this share of its size where that
+# is more: it may rest further on, but not where the load was borne.
 _SLID = 0.001
 
 # Where the body as a whole fails, blocks without balance fail with it that moved this share of the farthest way.
@@ -51,6 +52,13 @@ class Onset(NamedTuple):
     out: int
     lost: int
     share: float
+
+
+class Standing(NamedTuple):
+    """Middles of blocks (blocks, 2), and how far each had come by when it was last in balance (blocks,) [m]."""
+
+    middle: np.ndarray
+    came: np.ndarray
 
 
 class _Stretch:
@@ -122,21 +130,34 @@ class Falling:
         return model.block_share(self._resisted)
 
     def all_fell(self, model: BlockModel) -> bool:
-        """Whether no block stands that could fall: none of those that nothing holds and that are there."""
-        held = np.zeros(len(self._size), dtype=bool)
-        held[model.bodies.vertex_block[model.held.any(axis=1)]] = True
-        free = ~held & ~model.removed
+        """Whether no block stands but those that are fixed; one on rollers stands, whatever it does."""
+        fixed = np.zeros(len(self._size), dtype=bool)
+        fixed[model.bodies.vertex_block[model.held.all(axis=1)]] = True
+        free = ~fixed & ~model.removed
         return bool(free.any() and (self.fallen[free, 3] >= 0).all())
 
-    def slid(self, model: BlockModel, share: float) -> np.ndarray:
-        """Blocks (flags) that lost their balance beyond doubt and then went on as far again as they had come.
+    def standing(self, model: BlockModel) -> Standing:
+        """Where blocks stand as loads begin to stay."""
+        return Standing(self._centres(model), self._came(model))
 
-        share : of the way from where the block was laid out to where it stood last; a small part of its size at least
+    def go_on(self, model: BlockModel, loaded: np.ndarray, share: float, since: Standing | None) -> bool:
+        """Whether another loaded block (flags) has fallen by now: they may not go as far again as they had come.
+
+        share : of the way that they had come, instead of as far again
+        since : where they stood as loads began to stay; None: loads change, so those count that lost their balance
+        beyond doubt, from there on
         """
-        b, centre = model.bodies, self._centres(model)
-        came = np.hypot(*(self._stood - _middles(b, b.position)).T)
-        went = np.hypot(*(centre - self._from).T)
-        return (self._stretches[3].since >= 0) & (went > np.maximum(share * came, _SLID * self._size)) & ~model.removed
+        centre = self._centres(model)
+        if since is None:
+            out, begin, came = self._stretches[3].since >= 0, self._from, self._came(model)
+        else:
+            out, (begin, came) = ~model.removed, since
+        went = np.hypot(*(centre - begin).T) > np.maximum(share * came, _SLID * self._size)
+        return self._fall(model, loaded & out & went)
+
+    def _came(self, model: BlockModel) -> np.ndarray:
+        """Ways (blocks,) from where blocks were laid out to where they were last in balance [m]."""
+        return np.asarray(np.hypot(*(self._stood - _middles(model.bodies, model.bodies.position)).T))
 
     def fail(self, model: BlockModel) -> None:
         """The body as a whole has failed: blocks that are going with it have fallen."""

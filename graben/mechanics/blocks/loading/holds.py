@@ -21,6 +21,9 @@ from graben.mechanics.blocks.record import snapshot
 # A first step, over the whole rise; steps that it takes at least; tries at most.
 _FIRST, _LEAST, _TRIES = 0.1, 500, 60
 
+# Shares of the rise: a body that fails under less bears nothing, and nothing closer is told apart.
+_LEAST_LOAD, _FINEST = 1e-4, 1e-9
+
 # Strength is reduced from what holds more or less everything, by factors, up to what holds next to nothing.
 _STRONG, _FACTOR, _WEAK = 0.125, 1.5, 20.0
 
@@ -38,7 +41,7 @@ class Holds(Programme):
         super().__init__(*arguments, **options)
         self.steps, self.width, self.weaken = steps, width, weaken
         self.low, self.high, self.tried = (_STRONG if weaken else 0.0), np.inf, False
-        self.last, self.tries, self._fallen, self._slid = (_WEAK if weaken else self.end), 0, 0, False
+        self.last, self.tries, self._fallen = (_WEAK if weaken else self.end), 0, 0
         if weaken:
             self.model.weaken(self.low)
 
@@ -71,14 +74,24 @@ class Holds(Programme):
             if self.narrow:
                 self.rise.failed = True
                 break
+            if self.tries + 1 == _TRIES:
+                # What is known then is a bracket all the same, though a wide one.
+                self.rise.failed = True
+                break
             self._bring(kept)
         if m.time > self._saved_at:
             yield self._moment(save=True)
 
     @property
     def narrow(self) -> bool:
-        """Whether the bracket is as narrow as wanted."""
-        return self.high - self.low <= self.width * 0.5 * (self.high + self.low)
+        """Whether the bracket is as narrow as wanted, over the failure load and over the time at which it came."""
+        if np.isinf(self.high):
+            return False
+        nothing = self.low == 0.0 and self.high <= _LEAST_LOAD * self.end
+        if nothing or self.high - self.low <= _FINEST * self.end:
+            return True
+        close = self.high - self.low <= self.width * 0.5 * (self.high + self.low)
+        return close and (self.weaken or self.loads.apart(self.low, self.high) <= self.width)
 
     def _next(self) -> float:
         """What is tried next: further up, between, or the upper end once more, from a new lower one."""
@@ -98,7 +111,7 @@ class Holds(Programme):
     def _try(self, target: float) -> Iterator[Moment]:
         """Go there from where the body rests, and hold."""
         rise, start = self.rise, self.rise.load_time
-        self.at_rest, self._fallen, self._slid = False, len(self.falling.blocks), False
+        self.at_rest, self._fallen = False, len(self.falling.blocks)
         share = _FIRST if self.weaken else (target - start) / self.end
         chunks = max(_LEAST, round(share * self.steps)) // HOLD + 1
         for k in range(chunks):
@@ -113,8 +126,8 @@ class Holds(Programme):
             yield self._moment(save=False)._replace(words=words)
 
     def _over(self) -> bool:
-        """Whether blocks fell in this try that are a failure, or the loaded ground went on."""
-        return self._slid or (len(self.falling.blocks) > self._fallen and self._ends())
+        """Whether blocks fell in this try that are a failure."""
+        return len(self.falling.blocks) > self._fallen and self._ends()
 
     def _load(self, share: float, start: float, target: float) -> None:
         """Loads, or strength, at a share of the way from start to target; loads get there by even steps."""
@@ -131,22 +144,8 @@ class Holds(Programme):
 
     def _look(self, *, steady: bool = False) -> None:
         super()._look(steady=steady)
-        slid = self.falling.slid(self.model, self.control.beyond) & self._ground()
-        self._slid = self._slid or bool(slid.any())
         # Whether a try failed is known at its end.
         self.rise.failed = self.rise.fell = False
-
-    def _ground(self) -> np.ndarray:
-        """Blocks (flags) that must not go as far again as they had come, though they may rest further on.
-
-        It is the ground under the loads that change, as where they rise; where none does, that under all pressures;
-        and where weight alone acts all blocks bear the load, unless they may fall.
-        """
-        if self.loads.direction.any():
-            return self._under(self.loads.direction.any(axis=1))
-        if self.loads.pressed.any():
-            return self._under(self.loads.pressed)
-        return np.full(len(self.falling.fallen), not self.may_fall)
 
     def failure(self) -> Failure | None:
         """The bracket, and its middle."""

@@ -64,6 +64,12 @@ class Loads:
         """Sum of the loads (vertices, 2) at a time."""
         return sum((course.at(time) * force for force, course in self.patterns), np.zeros_like(self.direction))
 
+    def apart(self, start: float, end: float) -> float:
+        """How far the loads of two times are apart, over the mean of both; infinite where that is nothing."""
+        first, last = self._at(start), self._at(end)
+        apart, mean = (float(np.linalg.norm(v)) for v in (last - first, 0.5 * (first + last)))
+        return apart / mean if mean > 0.0 else (np.inf if apart > 0.0 else 0.0)
+
     def next_point(self, time: float) -> float:
         """Time of the next point of any course; infinite after the last."""
         return min((course.next_point(time) for _, course in self.patterns), default=float("inf"))
