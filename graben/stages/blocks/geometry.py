@@ -23,6 +23,7 @@ from graben.mechanics.plane.rings import refuse_crossing, turning_corners
 from graben.schemas.polygon_file import Polygons
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.stages.blocks.extent import extent_of, map_of
+from graben.stages.blocks.holes import taken_by_holes
 
 _log = logging.getLogger(__name__)
 
@@ -72,20 +73,25 @@ def lay_out(scene: BlocksScene, given: Polygons | None = None) -> Ground:
     local = _counted_from(scene, origin)
     _refuse_crossings(local, origin)
     outline = turning_corners(np.array(local.domain.corners))
-    limits = [_MENDED * t.edge if limit is None else limit for limit in (t.shortest_edge, t.thinnest)]
+    shortest, thinnest = (_MENDED * t.edge if limit is None else limit for limit in (t.shortest_edge, t.thinnest))
+    holes = [np.array(hole) for hole in local.domain.holes]
+    fit = {"shortest": shortest, "thinnest": thinnest, "holes": holes, "origin": origin}
     mended: dict[str, Any] = {}
     try:
         if given is not None:
-            blocks, mended = _of_map(local, given, origin, outline, limits)
+            shapes, marks, mended = _of_map(local, given, origin, outline)
+            blocks = mend(shapes, marks, **fit)
         elif t.method == "joint-sets":
             sets = [JointSet(s.dip, s.spacing, s.persistence, s.dip_scatter, s.spacing_scatter) for s in t.sets]
             shapes, marks = (list(part) for part in zip(*cut_by_sets(outline, sets, scene.seed)))
-            blocks = mend(shapes, marks if scene.joints.sets else None, shortest=limits[0], thinnest=limits[1])
+            blocks = mend(shapes, marks if scene.joints.sets else None, **fit)
         else:
-            blocks = voronoi_blocks(outline, t.edge, scene.seed, t.lloyd_passes, t.shortest_edge)
-        blocks = without(blocks, [np.array(hole) for hole in local.domain.holes])
+            whole = voronoi_blocks(outline, t.edge, scene.seed, t.lloyd_passes, t.shortest_edge)
+            shapes = [whole.points[ring] for ring in whole.rings]
+            blocks = without(whole, holes)
     except Refused as error:
         raise BadInput(Fault(str(scene.source.path), "tessellation", t.method, str(error))) from error
+    mended |= taken_by_holes(local, shapes, blocks.outline, origin)
     if scene.programme is None:
         _refuse_other_shapes(scene, blocks)
     _warn_of_mending(scene, blocks)
@@ -136,9 +142,9 @@ def _refuse_crossings(scene: BlocksScene, origin: np.ndarray) -> None:
 
 
 def _of_map(
-    scene: BlocksScene, found: Polygons, origin: np.ndarray, outline: np.ndarray, limits: list[float]
-) -> tuple[Tessellation, dict[str, Any]]:
-    """Blocks of a map, once it is a coverage of the domain."""
+    scene: BlocksScene, found: Polygons, origin: np.ndarray, outline: np.ndarray
+) -> tuple[list[np.ndarray], list[np.ndarray] | None, dict[str, Any]]:
+    """Rings and sets of joints of a map, once it is a coverage of the domain, and headline numbers on it."""
     t, d = scene.tessellation, scene.domain
     rings = [ring - origin for ring in found.rings]
     points = np.vstack(rings)
@@ -156,8 +162,6 @@ def _of_map(
         faults = [Fault(str(t.file), f.found, "", f.expected) for f in sound.faults[:_MOST_FAULTS]]
         faults += [Fault(str(t.file), f"{more} more faults", "", "a map that is a coverage")] if more > 0 else []
         raise BadInput(faults)
-    marks = sound.sets if scene.joints.sets else None
-    blocks = mend(sound.rings, marks, shortest=limits[0], thinnest=limits[1])
     mended: dict[str, Any] = {}
     if found.without_geometry:
         mended["features_without_geometry"] = len(found.without_geometry)
@@ -165,7 +169,7 @@ def _of_map(
     if sound.corners:
         mended |= {"snapped_corners": sound.corners, "largest_snap_m": sound.largest_move}
         _log.warning("%s: %d corners snapped, by up to %.3g m", t.file, sound.corners, sound.largest_move)
-    return blocks, mended
+    return sound.rings, sound.sets if scene.joints.sets else None, mended
 
 
 def _warn_of_mending(scene: BlocksScene, blocks: Tessellation) -> None:
@@ -181,6 +185,11 @@ def _warn_of_mending(scene: BlocksScene, blocks: Tessellation) -> None:
             "their neighbours",
             t.file or scene.source.path, m.corners, m.largest_move, m.joints, np.degrees(m.largest_turn), m.blocks,
             share,
+        )  # fmt: skip
+    if m.slivers:
+        _log.warning(
+            "%s: %d slivers stay, since no neighbour makes one block with them (tessellation.thinnest)",
+            t.file or scene.source.path, m.slivers,
         )  # fmt: skip
 
 
@@ -217,4 +226,6 @@ def _moved(blocks: Tessellation) -> dict[str, Any]:
         "largest_turn_deg": float(np.degrees(m.largest_turn)),
         "merged_blocks": m.blocks,
         "merged_area_m2": m.area,
+        "left_slivers": m.slivers,
+        "largest_opening_change_m2": m.opening,
     }
