@@ -211,6 +211,15 @@ class ProgrammeReport:
         ends = (None, test.low) if test.rise.failed else (test.low, None)
         return dict(zip(names, (None, *ends), strict=True))
 
+    @property
+    def _cure(self) -> str:
+        """What makes the interval of the failure load narrower."""
+        if not isinstance(self.test, Holds):
+            return "take more steps (numerics.steps)"
+        if self.test.narrow:
+            return "ask for a narrower bracket (programme.bracket)"
+        return f"{self.test.tries} tries did not close the bracket, since the body bore some loads and then did not"
+
     def measures(self, headline: dict[str, Any]) -> list[Measure]:
         """Error measures with their thresholds."""
         undecided = headline["at_rest"] is False and not headline["failed"]
@@ -224,7 +233,7 @@ class ProgrammeReport:
             ),
             Measure(
                 "failure_load_width", headline["failure_load_width"], 0.1,
-                "the interval of the failure load is {percent} of it wide; take more steps (numerics.steps)",
+                "the interval of the failure load is {percent} of it wide; " + self._cure,
             ),
             Measure(
                 "imbalance", headline["imbalance"] if undecided else None, 0.0,

@@ -263,3 +263,21 @@ def test_a_key_block_that_drops_under_a_load_that_jumps_and_rests_has_failed(tmp
     assert headline["failure_load_high_pa"] - headline["failure_load_low_pa"] < 0.2 * exact
     times = read_artifact(output, "blocks").look_load_time.values
     assert times.min() >= 0.0 and times.max() <= 5.0 + 1e-9
+
+
+def test_a_wide_bracket_is_told_with_what_makes_it_narrower(tmp_path):
+    """A block pushed along its joint, bracketed to 30 %."""
+    push = KEY.replace("key.geojson", "push.geojson").replace('friction = "0 deg"', 'friction = "20 deg"')
+    a, b, c = push.index("[domain]"), push.index("[tessellation]"), push.index("supports = [")
+    shapes = [[[[x, y], [x + 2, y], [x + 2, y + h], [x, y + h], [x, y]]] for x, y, h in ((0, -0.5, 0.5), (0, 0, 1))]
+    features = [{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": shape}} for shape in shapes]
+    (tmp_path / "push.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    path = tmp_path / "push.toml"
+    path.write_text(
+        push[:a] + push[b:c] + 'bracket = 0.3\nsupports = [{start = ["0 m","-0.5 m"], end = ["2 m","-0.5 m"]}]\n'
+        'loads = [{start = ["0 m","0 m"], end = ["0 m","1 m"], rate = "10 kPa/s"}]\n'
+    )
+    headline = dem_run.run(path, tmp_path / "push.nc")
+    assert headline["failed"]
+    (warning,) = headline["warnings"]
+    assert "interval of the failure load" in warning and "programme.bracket" in warning
