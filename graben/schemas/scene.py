@@ -15,6 +15,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, PrivateAttr, Validat
 
 from graben.declared.knobs import Fidelity
 from graben.errors import BadInput, Fault, Refused
+from graben.schemas.old_keys import advice_on
 from graben.schemas.quantities import Integer, key
 from graben.schemas.reading import parse_toml, read_toml
 from graben.schemas.toml_text import toml_text, toml_value
@@ -148,7 +149,7 @@ def load_scene(given: Given, kind: str | Iterable[str], overrides: Overrides = (
     try:
         scene = model.model_validate(tables, context={"folder": path.resolve().parent})
     except ValidationError as error:
-        raise BadInput(_faults(str(path), error)) from None
+        raise BadInput(_faults(str(path), found, error)) from None
     scene._source = Source(path, text, settings)
     return scene
 
@@ -201,7 +202,7 @@ def _override(tables: dict[str, Any], setting: str) -> None:
     table[parts[-1]] = copy.deepcopy(value)
 
 
-def _faults(file: str, error: ValidationError) -> list[Fault]:
+def _faults(file: str, kind: str, error: ValidationError) -> list[Fault]:
     faults = []
     for e in error.errors(include_url=False):
         where = ".".join(str(part) for part in e["loc"])
@@ -209,7 +210,7 @@ def _faults(file: str, error: ValidationError) -> list[Fault]:
         if e["type"] == "missing":
             found, expected = "(absent)", "a value"
         elif e["type"] == "extra_forbidden":
-            found, expected = _shown(value), "no such key (see `graben scene KIND` for those that exist)"
+            found, expected = _shown(value), advice_on(kind, e["loc"])
         elif e["type"] in ("too_short", "too_long"):
             least, most = e["ctx"].get("min_length"), e["ctx"].get("max_length")
             found, expected = _shown(value), f"at most {most} values" if least is None else f"at least {least} values"

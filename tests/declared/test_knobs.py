@@ -10,6 +10,7 @@ import pytest
 from graben.declared.knobs import FIDELITIES, STAGES, SlowEnough, Times, knob, values_at
 from graben.schemas.kinds import SCENES
 from graben.schemas.scene import load_scene
+from graben.stages.blocks.extent import Extent
 from graben.stages.blocks.sizes import steps_of
 from graben.stages.calibrate.problem import plan_of, problem_of
 from graben.stages.fem_run.mesh import size_field
@@ -61,9 +62,10 @@ def test_stages_and_their_keys_are_listed_once():
 def test_blocks_take_the_declared_steps(fidelity):
     rule = values_at("blocks", fidelity)["numerics.steps"]
     fast = {"loading": {"confining_pressure": "1 GPa"}}
-    assert isinstance(rule, SlowEnough) and steps_of(scene("blocks", fidelity, **fast), 100.0) == rule.steps
+    body = Extent(10.0, 10.0, 100.0)
+    assert isinstance(rule, SlowEnough) and steps_of(scene("blocks", fidelity, **fast), body, 100.0) == rule.steps
     free = {"loading": {"confining_pressure": "1 Pa"}}
-    assert steps_of(scene("blocks", fidelity, **free), 100.0) == rule.most * rule.steps
+    assert steps_of(scene("blocks", fidelity, **free), body, 100.0) == rule.most * rule.steps
 
 
 @every_fidelity

@@ -10,7 +10,7 @@ import numpy as np
 from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading import programme as mechanics
-from graben.mechanics.blocks.loading.courses import Course
+from graben.mechanics.blocks.loading.courses import Clock, Course
 from graben.mechanics.blocks.loading.excavation import Dig, blocks_in
 from graben.mechanics.blocks.loading.failure import static_load
 from graben.mechanics.blocks.loading.holds import Holds
@@ -18,7 +18,7 @@ from graben.mechanics.blocks.loading.loads import Loads, on_segment, pressure_fo
 from graben.mechanics.blocks.loading.rise import Control
 from graben.mechanics.blocks.record.history import History
 from graben.schemas.scenes.blocks import BlocksScene
-from graben.schemas.scenes.blocks_loading import Load
+from graben.schemas.scenes.blocks_loading import Excavation, Load, Programme
 from graben.stages.blocks.report import energy_error, energy_measure, kinetic_measure, kinetic_share
 from graben.stages.shared.measures import Measure, number
 
@@ -39,15 +39,15 @@ def programme(scene: BlocksScene, model: BlockModel, steps: int) -> mechanics.Pr
         for axis, name in enumerate("xy"):
             if support.fix in (name, "both"):
                 model.hold(at, axis)
-    loads = Loads(len(b.position))
+    loads, clock = Loads(len(b.position)), clock_of(p)
     for k, load in enumerate(p.loads):
         try:
             unit = pressure_forces(b, np.array(load.start), np.array(load.end))
         except Refused as error:
             faults.append(Fault(file, f"programme.loads.{k}", load.name, f"a segment of the outline ({error})"))
             continue
-        loads.add(unit, _course(load))
-    digs = [Dig(np.array(dig.polygon), dig.time, dig.relax_over) for dig in p.excavations]
+        loads.add(unit, clock.stretched(_course(load)))
+    digs = [_dig(dig, clock) for dig in p.excavations]
     for k, dig in enumerate(digs):
         if not blocks_in(model, dig.polygon).any():
             expected = "a polygon that holds the middle of a block"
@@ -56,7 +56,7 @@ def programme(scene: BlocksScene, model: BlockModel, steps: int) -> mechanics.Pr
         raise BadInput(faults)
     control = Control(p.frame, p.beyond)
     options: dict[str, Any] = {
-        "end": p.end,
+        "end": clock.end,
         "save_every": p.save_every,
         "tolerance": scene.numerics.consolidation_tolerance,
         "may_fall": p.falling,
@@ -64,9 +64,23 @@ def programme(scene: BlocksScene, model: BlockModel, steps: int) -> mechanics.Pr
     }
     if p.bracket is None and not p.strength_reduction:
         return mechanics.Programme(model, loads, control, digs=digs, **options)
+    steps = round(steps * clock.end / p.end)
     width = _WIDTH if p.bracket is None else p.bracket
     return Holds(model, loads, control, steps=steps, width=width, weaken=p.strength_reduction, **options)
 
+
+def _dig(dig: Excavation, clock: Clock) -> Dig:
+    time = clock.reading(dig.time)
+    return Dig(np.array(dig.polygon), time, clock.reading(dig.time + dig.relax_over) - time)
+
+
+def clock_of(p: Programme) -> Clock:
+    """A load that jumps may bring the body down anywhere in between, so tests go by a clock on which none does."""
+    return Clock([_course(load) for load in p.loads], p.end, _JUMP * p.end)
+
+
+# What a jump of a load takes of the time of even rise.
+_JUMP = 0.1
 
 # Width of the bracket of a factor of safety, where the scene says nothing.
 _WIDTH = 0.02
@@ -96,6 +110,7 @@ class ProgrammeReport:
         assert scene.programme is not None
         self.programme, self.test, self.model = scene.programme, test, test.model
         self._weight = test.model.weight.copy()  # before anything is taken out
+        self._clock = clock_of(scene.programme)
 
     def arrays(self, history: History) -> dict[str, np.ndarray]:
         """Arrays of the artifact that only this test has."""
@@ -103,11 +118,11 @@ class ProgrammeReport:
         surface = self._surface()
         return {
             "confining_stress": np.array(0.0),
-            "load_time": np.array(self.test.load_times[: len(history.time)]),
-            "look_load_time": looks[:, 0],
+            "load_time": self._clock.time(np.array(self.test.load_times[: len(history.time)])),
+            "look_load_time": self._clock.time(looks[:, 0]),
             "look_settlement": looks[:, 1],
             "look_imbalance": looks[:, 2],
-            "look_load_at_rest": static_load(looks[:, 0], looks[:, 3], looks[:, 4]),
+            "look_load_at_rest": self._clock.time(static_load(looks[:, 0], looks[:, 3], looks[:, 4])),
             "surface_vertex": surface,
             "surface_carried_displacement": (self.test.carried - history.reference)[surface],
         }
@@ -132,6 +147,7 @@ class ProgrammeReport:
         rise, test = self.test.rise, self.test
         reference = arrays["vertex_position"]
         course = next((c for c in map(_course, self.programme.loads) if c.changes), Course([(0.0, 0.0)]))
+        course = self._clock.stretched(course)
         looks = test.look_table()
         farthest = float(looks[:, 0].max()) if len(looks) else 0.0
         passed = (v for t, v in zip(course.times, course.values, strict=True) if t <= farthest)
@@ -175,7 +191,6 @@ class ProgrammeReport:
         load, there = course.at(found.load), course.at(found.load + found.inertia)
         low, high = sorted((course.at(found.low), course.at(found.high)))
         if isinstance(self.test, Holds):
-            # A bracket may close around a jump.
             load = there = 0.5 * (low + high)
         low, high = low - _REPEATS * abs(load), high + _REPEATS * abs(load)
         over = abs(course.at(float(self.test.look_table()[self.test.first_look :, 0].max())) - load)
@@ -196,6 +211,15 @@ class ProgrammeReport:
         ends = (None, test.low) if test.rise.failed else (test.low, None)
         return dict(zip(names, (None, *ends), strict=True))
 
+    @property
+    def _cure(self) -> str:
+        """What makes the interval of the failure load narrower."""
+        if not isinstance(self.test, Holds):
+            return "take more steps (numerics.steps)"
+        if self.test.narrow:
+            return "ask for a narrower bracket (programme.bracket)"
+        return f"{self.test.tries} tries did not close the bracket, since the body bore some loads and then did not"
+
     def measures(self, headline: dict[str, Any]) -> list[Measure]:
         """Error measures with their thresholds."""
         undecided = headline["at_rest"] is False and not headline["failed"]
@@ -209,7 +233,7 @@ class ProgrammeReport:
             ),
             Measure(
                 "failure_load_width", headline["failure_load_width"], 0.1,
-                "the interval of the failure load is {percent} of it wide; take more steps (numerics.steps)",
+                "the interval of the failure load is {percent} of it wide; " + self._cure,
             ),
             Measure(
                 "imbalance", headline["imbalance"] if undecided else None, 0.0,

@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from graben.schemas.scenes.blocks import BlocksScene, Tessellation
+from graben.stages.blocks.extent import Extent
 from graben.stages.shared.estimate import Estimate, tiles, work
 from graben.stages.shared.fidelity import setting
 
@@ -17,7 +18,7 @@ _BLOCK_BYTES = 4000.0  # model, contacts and candidates
 _STATE_BYTES = 600.0  # of a block with four zones in one saved state
 
 
-def steps_of(scene: BlocksScene, blocks: float) -> int:
+def steps_of(scene: BlocksScene, extent: Extent, blocks: float) -> int:
     """Steps of loading: those of the scene, or those of its fidelity and no fewer than inertia allows.
 
     Scaled masses make the wave cross a block in about a step, so the inertial number of a compression by the strain
@@ -26,35 +27,32 @@ def steps_of(scene: BlocksScene, blocks: float) -> int:
 
     Parameters
     ----------
-    blocks : their number, estimated or counted
+    extent : of the body; blocks : their number, estimated or counted
     """
     rule = setting(scene, "numerics.steps")
     if isinstance(rule, int):
         return rule
     if scene.programme is not None:
         return int(rule.steps)
-    loading, corners = scene.loading, np.array(scene.domain.corners)
-    width, height = np.ptp(corners, axis=0)
+    loading = scene.loading
     fastest = max(abs(v) for _, v in loading.speed_course or ((0.0, loading.speed),))
-    strain = fastest * loading.duration / height
-    along = math.sqrt(blocks * height / width)
+    strain = fastest * loading.duration / extent.height
+    along = math.sqrt(blocks * extent.height / extent.width)
     lowest = min(pressure for _, pressure in loading.confining_course or ((0.0, loading.confining_pressure),))
     stretch = strain * along * math.sqrt(scene.rock.young / lowest)
     return max(rule.steps, min(math.ceil(stretch / rule.inertia), rule.most * rule.steps))
 
 
-def sizes_of(scene: BlocksScene) -> list[Estimate]:
-    """Estimates of a scene; the blocks of a file are not known before it is read, and count as one."""
-    t, corners = scene.tessellation, np.array(scene.domain.corners)
-    edges = corners * np.roll(corners, -1, axis=0)[:, ::-1]
-    area = 0.5 * abs(float((edges[:, 0] - edges[:, 1]).sum()))
-    blocks, key, value = 1.0, "tessellation.file", str(t.file)
+def sizes_of(scene: BlocksScene, extent: Extent) -> list[Estimate]:
+    """Estimates of a scene; the blocks of a map are counted."""
+    t, area = scene.tessellation, extent.area
+    blocks, key, value = float(extent.blocks or 1), "tessellation.file", str(t.file)
     if t.method == "voronoi":
         blocks, key, value = tiles(area / _VORONOI_AREA, t.edge), "tessellation.edge", f"{t.edge:g} m"
     elif t.method == "joint-sets":
-        blocks, key = _between_joints(t, corners, area), "tessellation.sets"
+        blocks, key = _between_joints(t, np.array(scene.domain.corners), area), "tessellation.sets"
         value = "spacing " + ", ".join(f"{s.spacing:g} m" for s in t.sets)
-    steps = steps_of(scene, blocks)
+    steps = steps_of(scene, extent, blocks)
     zones = _ZONES * blocks
     if t.zone_edge is not None and tiles(area, t.zone_edge) > zones:
         zones, key, value = tiles(area, t.zone_edge), "tessellation.zone_edge", f"{t.zone_edge:g} m"

@@ -20,6 +20,7 @@ from graben.schemas.outputs import CHECKPOINT, PARTIAL, SERIES, Outputs, beside
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.stages.blocks import checkpoint as blocks_checkpoint
 from graben.stages.blocks.biaxial import BiaxialReport, biaxial
+from graben.stages.blocks.extent import extent_of, map_of
 from graben.stages.blocks.geometry import Ground, lay_out
 from graben.stages.blocks.model import block_model
 from graben.stages.blocks.output import write_vtk
@@ -142,11 +143,13 @@ def prepare(scene: BlocksScene) -> Prepared:
     BadInput : the scene is too large, or the mechanics refuse it
     """
     file, biaxial_test = scene.source.path, scene.programme is None
-    sizes = sizes_of(scene)
+    given = map_of(scene)
+    extent = extent_of(scene, given)
+    sizes = sizes_of(scene, extent)
     refuse_too_large(file, sizes)
-    ground = lay_out(scene)
+    ground = lay_out(scene, given)
     scene = ground.scene
-    steps = steps_of(scene, ground.blocks.size)
+    steps = steps_of(scene, extent, ground.blocks.size)
     if biaxial_test and scene.loading.states > steps + 1:
         expected = f"at most {steps + 1}: one state a step"
         raise BadInput(Fault(str(file), "loading.states", str(scene.loading.states), expected))

@@ -1,5 +1,7 @@
 """dem-run on blocks of any outline: weight, rising pressure, failure; stopped runs go on bitwise."""
 
+import json
+
 import numpy as np
 import pytest
 import xarray
@@ -211,3 +213,71 @@ def test_loads_and_strength_are_bracketed(scene):
     assert check_artifact(scene.with_name("safety.nc")) == []
     with xarray.open_dataset(scene.with_name("safety.nc")) as dataset:
         assert safety["factor_of_safety"] < dataset["load_time"].values[-1] < safety["factor_of_safety_high"]
+
+
+KEY = """
+kind = "blocks"
+fidelity = "draft"
+[domain]
+holes = [[["1 m","0 m"],["2 m","0 m"],["2 m","0.05 m"],["1 m","0.05 m"]]]
+[tessellation]
+method = "file"
+file = "key.geojson"
+edge = "1 m"
+shortest_edge = "5 mm"
+thinnest = "5 mm"
+rounding = "1 cm"
+[rock]
+young = "20 GPa"
+density = "2500 kg/m^3"
+[joints]
+friction = "0 deg"
+cohesion = "20 kPa"
+dilation = "0 deg"
+[output]
+vtk = false
+[programme]
+end = "10 s"
+supports = [
+  {start = ["0 m","-0.5 m"], end = ["3 m","-0.5 m"]},
+  {start = ["0 m","0 m"], end = ["0 m","1.05 m"], fix = "x"},
+  {start = ["3 m","0 m"], end = ["3 m","1.05 m"], fix = "x"},
+]
+"""
+
+
+@pytest.mark.parametrize("bracket", ["", "programme.bracket=0.05"], ids=["rise", "bracket"])
+def test_a_key_block_that_drops_under_a_load_that_jumps_and_rests_has_failed(tmp_path, bracket):
+    """2 c (h - 2 r) less the weight, 14.7 kPa, lies inside the jump; times in the artifact are those of the scene."""
+    rings = [(0, 0, 1, 1.05), (1, 0.05, 2, 1.05), (2, 0, 3, 1.05), (0, -0.5, 3, 0)]
+    shapes = [[[[a, b], [c, b], [c, d], [a, d], [a, b]]] for a, b, c, d in rings]
+    features = [{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": shape}} for shape in shapes]
+    (tmp_path / "key.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    path, output = tmp_path / "key.toml", tmp_path / "key.nc"
+    course = '[["0 s","0 Pa"],["5 s","0 Pa"],["5 s","60 kPa"],["10 s","60 kPa"]]'
+    path.write_text(KEY + f'loads = [{{start = ["1 m","1.05 m"], end = ["2 m","1.05 m"], course = {course}}}]\n')
+    headline = dem_run.run(path, output, overrides=[bracket] if bracket else [])
+    exact = 2.0 * 20e3 * 0.98 - 2500.0 * 9.81
+    assert headline["failed"] and headline["failure_load_pa"] == pytest.approx(exact, rel=0.05)
+    assert 0.99 * headline["failure_load_low_pa"] < exact < 1.01 * headline["failure_load_high_pa"]
+    assert headline["failure_load_high_pa"] - headline["failure_load_low_pa"] < 0.2 * exact
+    times = read_artifact(output, "blocks").look_load_time.values
+    assert times.min() >= 0.0 and times.max() <= 5.0 + 1e-9
+
+
+def test_a_wide_bracket_is_told_with_what_makes_it_narrower(tmp_path):
+    """A block pushed along its joint, bracketed to 30 %."""
+    push = KEY.replace("key.geojson", "push.geojson").replace('friction = "0 deg"', 'friction = "20 deg"')
+    a, b, c = push.index("[domain]"), push.index("[tessellation]"), push.index("supports = [")
+    shapes = [[[[x, y], [x + 2, y], [x + 2, y + h], [x, y + h], [x, y]]] for x, y, h in ((0, -0.5, 0.5), (0, 0, 1))]
+    features = [{"type": "Feature", "geometry": {"type": "Polygon", "coordinates": shape}} for shape in shapes]
+    (tmp_path / "push.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    path = tmp_path / "push.toml"
+    path.write_text(
+        push[:a] + push[b:c] + 'bracket = 0.3\nsupports = [{start = ["0 m","-0.5 m"], end = ["2 m","-0.5 m"]}]\n'
+        'loads = [{start = ["0 m","0 m"], end = ["0 m","1 m"], rate = "10 kPa/s"}]\n'
+    )
+    headline = dem_run.run(path, tmp_path / "push.nc")
+    assert headline["failed"]
+    (warning,) = headline["warnings"]
+    assert "interval of the failure load" in warning and "programme.bracket" in warning

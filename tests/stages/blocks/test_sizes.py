@@ -4,6 +4,7 @@ import pytest
 
 from graben.declared.knobs import values_at
 from graben.schemas.scene import load_scene
+from graben.stages.blocks.extent import extent_of
 from graben.stages.blocks.sizes import steps_of
 from tests.conftest import PIPELINES, command, settings
 
@@ -13,7 +14,8 @@ LEAST = values_at("blocks", "draft")["numerics.steps"].steps
 
 
 def steps(*overrides, blocks=420.0, scene=GRANITE):
-    return steps_of(load_scene(scene, "blocks", [*DRAFT, *overrides]), blocks)
+    loaded = load_scene(scene, "blocks", [*DRAFT, *overrides])
+    return steps_of(loaded, extent_of(loaded, None), blocks)
 
 
 def pressure(mpa):

@@ -1,6 +1,7 @@
-"""A block model that can be stepped: constraints, loads and damping around the compiled loop.
+"""A block model that can be stepped: constraints, strength and damping around the compiled loop.
 
-It owns its state: what changes it is a method here, and slots of the records are read and written in this room only.
+It owns its state: what changes it is a method here, or of its loads in drive.py, and slots of the records are read
+and written in this room only.
 """
 
 from __future__ import annotations
@@ -16,20 +17,15 @@ from graben.mechanics.blocks.contact.joints import Joint, Pairs, joint_table
 from graben.mechanics.blocks.contact.nodes import node_motion
 from graben.mechanics.blocks.contact.sleeping import fresh_sleep
 from graben.mechanics.blocks.engine import masses, motion, relaxation, setup
+from graben.mechanics.blocks.engine.drive import DrivenModel
 from graben.mechanics.blocks.engine.records import (
-    BRAKE,
     DAMPED,
     DAMPING,
     KINETIC,
     LARGEST_OVERLAP,
-    LOAD,
-    LOAD_STEP,
-    SPEED,
-    SPEED_STEP,
     Rules,
     private,
 )
-from graben.mechanics.blocks.engine.state import ModelState
 from graben.mechanics.blocks.engine.threads import run_together, share_out
 from graben.mechanics.blocks.shape.bodies import Bodies, chamfered_skin
 from graben.mechanics.blocks.shape.partition import cut_into_parts
@@ -51,7 +47,7 @@ class Damping:
     local: float = 0.0
 
 
-class BlockModel(ModelState):
+class BlockModel(DrivenModel):
     """Deformable blocks with Coulomb joints.
 
     Parameters: bodies; young [Pa], poisson, density [kg/m3]; joint; rounding [m] of corners.
@@ -298,45 +294,9 @@ class BlockModel(ModelState):
         mass = self.masses.plain(local, self.scaled) if local > 0.0 else self.masses.held(self.skeleton.still[:, 0])
         self.skeleton = self.skeleton._replace(mass=mass)
 
-    def set_load(self, factor: float, per_step: float = 0.0) -> None:
-        """The rising load counts `factor` times now, and by `per_step` more after each step."""
-        self.motion.drive[LOAD], self.motion.drive[LOAD_STEP] = factor, per_step
-
-    def raise_load(self, per_step: float, brake: float = 0.0) -> None:
-        """The rising load grows from where it is by `per_step` a step, and falls by `brake` times its way; 0: it
-        stays."""
-        self.motion.drive[LOAD_STEP], self.motion.drive[BRAKE] = per_step, brake
-
-    def set_speed(self, factor: float, per_step: float = 0.0) -> None:
-        """Prescribed velocities count `factor` times in the next step, and by `per_step` more after each, up to 1."""
-        self.motion.drive[SPEED], self.motion.drive[SPEED_STEP] = factor, per_step
-
     def add_time(self, seconds: float) -> None:
         """Time of loading that the last steps stood for beyond their own."""
         self.time += seconds
-
-    def press(self, edges: np.ndarray, normal_stress: float, rising: bool = False) -> None:
-        """Add a normal stress [Pa, tension positive] on outline edges (indices or mask), as steady or rising load.
-
-        The force keeps the direction and the length that the edges have now.
-        """
-        b, x = self.bodies, self.motion.x
-        a, c = b.edge_from[edges], b.edge_to[edges]
-        d = x[c] - x[a]
-        half = 0.5 * normal_stress * np.column_stack([d[:, 1], -d[:, 0]])
-        target = self.skeleton.rising if rising else self.skeleton.steady
-        np.add.at(target, a, half)
-        np.add.at(target, c, half)
-
-    def set_loads(self, steady: np.ndarray, rising: np.ndarray) -> None:
-        """Dead loads (vertices, 2) [N/m] instead of those before: steady ones with the weight, and rising ones that
-        stay at a factor of 0."""
-        self.skeleton.steady[:], self.skeleton.rising[:] = steady, rising
-        self.set_load(0.0)
-
-    def take_off_steady(self, vertices: np.ndarray, axis: int) -> None:
-        """No steady load but the weight acts on vertices (indices or mask) along an axis."""
-        self.skeleton.steady[vertices, axis] = self.weight[vertices, axis]
 
     def put_stress(self, gradient: np.ndarray, area: np.ndarray, pairs: Pairs) -> None:
         """Zones and joints carry stress from the start.

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from graben.mechanics.blocks.engine.model import BlockModel
+from graben.mechanics.blocks.shape.bodies import Bodies
 
 # Shares of the forces on a block that inertia and damping take up: in balance below the first, out of it above the
 # second; in the mean in balance below the third, and beyond doubt out of it above the fourth. They are small since
@@ -25,6 +26,10 @@ _LOOKS, _MEAN = 10, 500.0
 # A block has fallen when it moved by this share of its size without balance. When a body is put under its weight all
 # blocks move at first: those that never were in balance, and that others bear, may move by their size.
 _GONE, _PLACED = 0.1, 1.0
+
+# A block under a load has fallen where it goes as far again as it had come, or by this share of its size where that
+# is more: it may rest further on, but not where the load was borne.
+_SLID = 0.001
 
 # Where the body as a whole fails, blocks without balance fail with it that moved this share of the farthest way.
 _WITH_IT = 0.5
@@ -47,6 +52,13 @@ class Onset(NamedTuple):
     out: int
     lost: int
     share: float
+
+
+class Standing(NamedTuple):
+    """Middles of blocks (blocks, 2), and how far each had come by when it was last in balance (blocks,) [m]."""
+
+    middle: np.ndarray
+    came: np.ndarray
 
 
 class _Stretch:
@@ -117,6 +129,36 @@ class Falling:
         """Shares (blocks,) of the forces on blocks that inertia and damping take up in the mean over some steps."""
         return model.block_share(self._resisted)
 
+    def all_fell(self, model: BlockModel) -> bool:
+        """Whether no block stands but those that are fixed; one on rollers stands, whatever it does."""
+        fixed = np.zeros(len(self._size), dtype=bool)
+        fixed[model.bodies.vertex_block[model.held.all(axis=1)]] = True
+        free = ~fixed & ~model.removed
+        return bool(free.any() and (self.fallen[free, 3] >= 0).all())
+
+    def standing(self, model: BlockModel) -> Standing:
+        """Where blocks stand as loads begin to stay."""
+        return Standing(self._centres(model), self._came(model))
+
+    def go_on(self, model: BlockModel, loaded: np.ndarray, share: float, since: Standing | None) -> bool:
+        """Whether another loaded block (flags) has fallen by now: they may not go as far again as they had come.
+
+        share : of the way that they had come, instead of as far again
+        since : where they stood as loads began to stay; None: loads change, so those count that lost their balance
+        beyond doubt, from there on
+        """
+        centre = self._centres(model)
+        if since is None:
+            out, begin, came = self._stretches[3].since >= 0, self._from, self._came(model)
+        else:
+            out, (begin, came) = ~model.removed, since
+        went = np.hypot(*(centre - begin).T) > np.maximum(share * came, _SLID * self._size)
+        return self._fall(model, loaded & out & went)
+
+    def _came(self, model: BlockModel) -> np.ndarray:
+        """Ways (blocks,) from where blocks were laid out to where they were last in balance [m]."""
+        return np.asarray(np.hypot(*(self._stood - _middles(model.bodies, model.bodies.position)).T))
+
     def fail(self, model: BlockModel) -> None:
         """The body as a whole has failed: blocks that are going with it have fallen."""
         going = (self._stretches[1].since >= 0) & (self.fallen[:, 3] < 0) & ~model.removed
@@ -151,10 +193,9 @@ class Falling:
             return Onset(block, steady, lost, lost, _STEADY / _LOST)
         return Onset(block, balanced, out, lost, _BALANCE / _OUT)
 
-    def _centres(self, model: BlockModel) -> np.ndarray:
-        block, count = model.bodies.vertex_block, len(model.bodies.block_area)
-        total = np.column_stack([np.bincount(block, x, count) for x in model.motion.x.T])
-        return total / np.bincount(block, minlength=count)[:, None]
+    @staticmethod
+    def _centres(model: BlockModel) -> np.ndarray:
+        return _middles(model.bodies, model.motion.x)
 
     def state(self) -> dict[str, np.ndarray]:
         """What a saved state must hold."""
@@ -186,3 +227,10 @@ class Falling:
         self._went, self._mark = state["fallen_went"].copy(), int(state["fallen_mark"])
         self._marked, self._way = state["fallen_marked"].copy(), state["fallen_way"].copy()
         self._as_far = state["fallen_as_far"].copy()
+
+
+def _middles(bodies: Bodies, x: np.ndarray) -> np.ndarray:
+    """Mean position (blocks, 2) of the vertices of each block, at x (vertices, 2) [m]."""
+    block, count = bodies.vertex_block, len(bodies.block_area)
+    total = np.column_stack([np.bincount(block, axis, count) for axis in x.T])
+    return total / np.bincount(block, minlength=count)[:, None]

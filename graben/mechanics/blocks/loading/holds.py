@@ -21,6 +21,9 @@ from graben.mechanics.blocks.record import snapshot
 # A first step, over the whole rise; steps that it takes at least; tries at most.
 _FIRST, _LEAST, _TRIES = 0.1, 500, 60
 
+# Shares of the rise: a body that fails under less bears nothing, and nothing closer is told apart.
+_LEAST_LOAD, _FINEST = 1e-4, 1e-9
+
 # Strength is reduced from what holds more or less everything, by factors, up to what holds next to nothing.
 _STRONG, _FACTOR, _WEAK = 0.125, 1.5, 20.0
 
@@ -71,14 +74,24 @@ class Holds(Programme):
             if self.narrow:
                 self.rise.failed = True
                 break
+            if self.tries + 1 == _TRIES:
+                # What is known then is a bracket all the same, though a wide one.
+                self.rise.failed = True
+                break
             self._bring(kept)
         if m.time > self._saved_at:
             yield self._moment(save=True)
 
     @property
     def narrow(self) -> bool:
-        """Whether the bracket is as narrow as wanted."""
-        return self.high - self.low <= self.width * 0.5 * (self.high + self.low)
+        """Whether the bracket is as narrow as wanted, over the failure load and over the time at which it came."""
+        if np.isinf(self.high):
+            return False
+        nothing = self.low == 0.0 and self.high <= _LEAST_LOAD * self.end
+        if nothing or self.high - self.low <= _FINEST * self.end:
+            return True
+        close = self.high - self.low <= self.width * 0.5 * (self.high + self.low)
+        return close and (self.weaken or self.loads.apart(self.low, self.high) <= self.width)
 
     def _next(self) -> float:
         """What is tried next: further up, between, or the upper end once more, from a new lower one."""
@@ -113,8 +126,8 @@ class Holds(Programme):
             yield self._moment(save=False)._replace(words=words)
 
     def _over(self) -> bool:
-        """Whether a block fell in this try."""
-        return not self.may_fall and len(self.falling.blocks) > self._fallen
+        """Whether blocks fell in this try that are a failure."""
+        return len(self.falling.blocks) > self._fallen and self._ends()
 
     def _load(self, share: float, start: float, target: float) -> None:
         """Loads, or strength, at a share of the way from start to target; loads get there by even steps."""

@@ -22,21 +22,25 @@ class Loads:
     def __init__(self, vertices: int) -> None:
         self.patterns: list[tuple[np.ndarray, Course]] = []
         self.direction = np.zeros((vertices, 2))
+        self.pressed = np.zeros(vertices, dtype=bool)
 
     def add(self, force: np.ndarray, course: Course, *, leading: bool = True) -> None:
         """A load: force (vertices, 2) [N/m] per unit of its course.
 
-        `direction`, along which settlement counts, is the sum of leading loads at their fastest rates.
+        `direction`, along which settlement counts, is the sum of leading loads at their fastest rates; `pressed` are
+        the vertices (flags) on which a leading load ever acts.
         """
         self.patterns.append((force, course))
         if leading:
             self.direction += course.fastest_rate * force
+            self.pressed |= force.any(axis=1) & course.acts
 
     def take_off(self, vertices: np.ndarray) -> None:
         """No load acts on these vertices (flags) any more."""
         for force, _ in self.patterns:
             force[vertices] = 0.0
         self.direction[vertices] = 0.0
+        self.pressed[vertices] = False
 
     def begin(self, model: BlockModel, time: float) -> None:
         """Set the model's loads for the stretch from `time` to the next point."""
@@ -59,6 +63,12 @@ class Loads:
     def _at(self, time: float) -> np.ndarray:
         """Sum of the loads (vertices, 2) at a time."""
         return sum((course.at(time) * force for force, course in self.patterns), np.zeros_like(self.direction))
+
+    def apart(self, start: float, end: float) -> float:
+        """How far the loads of two times are apart, over the mean of both; infinite where that is nothing."""
+        first, last = self._at(start), self._at(end)
+        apart, mean = (float(np.linalg.norm(v)) for v in (last - first, 0.5 * (first + last)))
+        return apart / mean if mean > 0.0 else (np.inf if apart > 0.0 else 0.0)
 
     def next_point(self, time: float) -> float:
         """Time of the next point of any course; infinite after the last."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, fields
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.courses import Course
 from graben.mechanics.blocks.loading.excavation import Dig, blocks_in
 from graben.mechanics.blocks.loading.failure import Failure, failure_of, loss_of_balance, tenfold_speed
-from graben.mechanics.blocks.loading.falling import REST, Falling
+from graben.mechanics.blocks.loading.falling import REST, Falling, Standing
 from graben.mechanics.blocks.loading.loads import Loads
 from graben.mechanics.blocks.loading.protocol import Moment, State, refuse_unlike
 from graben.mechanics.blocks.loading.resistance import Resistance
@@ -36,7 +37,7 @@ class Programme:
 
     end : load time at which the rise is complete, save_every : load time between saved states [s]
     tolerance : of `imbalance` at rest
-    may_fall : whether blocks may fall without ending the test
+    may_fall : whether blocks may fall without ending the test, but for those under loads, and for the last one
     set_in : steps over which weight and steady pressures grow at first; 0: they are there, as stress in situ wants
     looks : (load time [s], settlement [m], imbalance, way, resisted, step) after every chunk, see `Rise`;
     load_times : of saved states [s]; first_look : the first since rates of loads last changed
@@ -72,6 +73,7 @@ class Programme:
         self._saved_at = model.time
         self._digs = sorted(digs, key=lambda dig: dig.time)
         self._dug = 0
+        self._stood: Standing | None = None  # as loads began to stay; None while they change
         self._released: list[tuple[float, float, np.ndarray]] = []  # from, over, forces
         loads.begin(model, 0.0)
 
@@ -84,7 +86,7 @@ class Programme:
         advice = "the body does not stand; strengthen the joints or support it"
         for ratio in settle(m, self.tolerance, self._settling, limit=100_000, where=where, advice=advice):
             yield Moment(0.0, f"coming to rest, {m.steps_done} steps, unbalanced force ratio {ratio:.2g}")
-            if len(self.falling.blocks) and not self.may_fall:
+            if len(self.falling.blocks) and self._ends():
                 self.rise.failed = self.rise.fell = True
                 break
         m.spare_joints(False)
@@ -165,7 +167,7 @@ class Programme:
     def _stand(self, limit: int) -> Iterator[tuple[int, float]]:
         """Steps under what acts now, until the body is at rest or has failed; gives their number and the unrest."""
         m, steps, damping = self.model, 0, self.model.damping
-        self.at_rest = False
+        self.at_rest, self._stood = False, self.falling.standing(m)
         m.damp(REST_DAMPING)
         while not self.at_rest and not self._over() and steps < limit:
             self._advance(steady=True)
@@ -174,6 +176,7 @@ class Programme:
             self.at_rest = steps >= _STILL and not self._over() and ratio < self.tolerance
             yield steps, ratio
         m.damp(damping)
+        self._stood = None
 
     def _over(self) -> bool:
         """Whether the body has failed."""
@@ -206,11 +209,44 @@ class Programme:
         self.looks.append(look)
         if rise.load_time >= rise.largest:
             self.carried = model.motion.x.copy()
-        if self.falling.look(model, self.resistance.force, steady=steady) and not self.may_fall:
+        fell = self.falling.look(model, self.resistance.force, steady=steady)
+        if self._dead:
+            fell |= self.falling.go_on(model, self._loaded(), self.control.beyond, self._stood)
+        if fell and self._ends():
             rise.failed = rise.fell = True
         elif rise.failed:
             self.falling.fail(model)
         self.resistance.counted = (self.falling.fallen[:, 3] < 0)[model.bodies.vertex_block]
+
+    def _ends(self) -> bool:
+        """Whether the blocks that fell are a failure of the body: any, or where they may fall, those that bear."""
+        return not self.may_fall or self._loaded_fell() or self.falling.all_fell(self.model)
+
+    def _loaded_fell(self) -> bool:
+        return bool((self.falling.fallen[self._under(self.loads.pressed), 3] >= 0).any())
+
+    @property
+    def _dead(self) -> bool:
+        """Whether no frame holds the loads now, so that loaded blocks are watched instead of the way of the ground.
+
+        What digging moves has been pushed: it may go far, and rest.
+        """
+        return not self._dug and (self._stood is not None or self.rise.compliance <= 0.0)
+
+    def _loaded(self) -> np.ndarray:
+        """Blocks (flags) under loads that change; where none does, under all pressures; and where weight alone acts
+        all, unless they may fall."""
+        if self.loads.direction.any():
+            return self._under(self.loads.direction.any(axis=1))
+        if self.loads.pressed.any():
+            return self._under(self.loads.pressed)
+        return np.full(len(self.falling.fallen), not self.may_fall)
+
+    def _under(self, vertices: Any) -> np.ndarray:
+        """Blocks (flags) of vertices (flags)."""
+        blocks = np.zeros(len(self.falling.fallen), dtype=bool)
+        blocks[self.model.bodies.vertex_block[vertices]] = True
+        return blocks
 
     def look_table(self) -> np.ndarray:
         """The looks as rows (looks, 6)."""

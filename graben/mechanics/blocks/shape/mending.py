@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import itertools
 from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,15 +27,18 @@ from graben.mechanics.blocks.shape.tessellation import (
     edge_key,
     edges_of,
     from_rings,
+    in_holes,
     shared_points,
 )
 from graben.mechanics.plane import polygons
-from graben.mechanics.plane.rings import STRAIGHT, refuse_crossing
+from graben.mechanics.plane.rings import STRAIGHT, place, refuse_crossing
 
 # A joint that turns by less has kept its direction [rad].
 _TURNED = np.radians(0.1)
 # A larger part of the area in blocks that mending takes away makes another rock of it.
 MOST_SLIM = 0.5
+# An opening that keeps less of its area has gone.
+_STAYS = 0.5
 
 
 def mend(
@@ -44,11 +48,16 @@ def mend(
     shortest: float,
     thinnest: float,
     smallest: float = 0.02,
+    holes: Sequence[np.ndarray] = (),
+    origin: np.ndarray | None = None,
 ) -> Tessellation:
     """Blocks from polygons (m, 2) [m] that fill a domain without overlaps. Refused where they do not.
 
     edge_sets : for each polygon the sets of joints (m,) of the edges from each corner to the next; None: one set
     shortest, thinnest : [m]; smallest : share of the median area
+    holes : polygons (n, 2) [m] that take out the blocks whose middle lies in one, before any is mended: no sliver
+    crosses the edge of a hole with its neighbour
+    origin : (2,) what corners count from [m], for messages
     """
     given = [np.asarray(s, float) for s in shapes]
     shapes = [s if polygons.signed_area(s) > 0.0 else s[::-1] for s in given]
@@ -61,18 +70,49 @@ def mend(
     marks = None if edge_sets is None else _marks(points, given, edge_sets)
     rings = _with_hanging_points(points, rings, marks)
     _refuse_overlaps(points, rings)
-    left = _merge_slivers(points, rings, thinnest, smallest)
-    outline = outer_boundary(points, list(left.values()))
+    outline = outer_boundary(points, rings)
+    gone = in_holes(points, rings, holes)
+    openings = _openings(points, rings, gone)
+    rings = [ring for ring, out in zip(rings, gone) if not out]
+    left, slivers = _merge_slivers(points, rings, thinnest, smallest)
     merged = [k for k in range(len(rings)) if k not in left]
     area = sum(polygons.signed_area(points[rings[k]]) for k in merged)
     blocks = from_rings(points, list(left.values()), outline, marks)
+    before, used = points, np.unique(np.concatenate([np.array(ring) for ring in left.values()]))
     points, rings, marks, became = collapsed(blocks, shortest, given=True)
+    change = _change(before, used, points[became], openings, np.zeros(2) if origin is None else origin)
     turning = [_turning(points, ring) for ring in rings]
     if marks is not None:
         for ring, kept in zip(rings, turning):
             _mark_straight_runs(points, ring, set(kept), marks)
-    moves = _moves(blocks, points, became)
-    return replace(from_rings(points, turning, outline, marks), mending=Mending(*moves, len(merged), float(area)))
+    done = Mending(*_moves(blocks, points, became), len(merged), float(area), slivers, change)
+    return replace(from_rings(points, turning, outline, marks), mending=done)
+
+
+def _openings(points: np.ndarray, rings: list[list[int]], gone: np.ndarray) -> list[list[int]]:
+    """Closed curves around what is taken out, and around voids that were there, by numbers of points."""
+    out = [ring for ring, flag in zip(rings, gone) if flag]
+    around = [loop for loop in _loops(out) if polygons.signed_area(points[loop]) > 0.0]
+    return around + [loop for loop in _loops(rings) if polygons.signed_area(points[loop]) < 0.0]
+
+
+def _change(
+    points: np.ndarray, used: np.ndarray, moved: np.ndarray, openings: list[list[int]], origin: np.ndarray
+) -> float:
+    """Largest change of the area of an opening [m2], whose `used` points have `moved`. Refused where one closes."""
+    after = points.copy()
+    after[used] = moved
+    change = 0.0
+    for loop in openings:
+        was, stays = (abs(polygons.signed_area(x[loop])) for x in (points, after))
+        if stays < _STAYS * was:
+            at = place(points[loop].mean(axis=0), origin)
+            raise Refused(
+                f"openings that mending leaves: one of {was:.3g} m2 at {at} would be {stays:.3g} m2; lower "
+                "tessellation.shortest_edge, or leave the hole out"
+            )
+        change = max(change, abs(stays - was))
+    return change
 
 
 def _moves(blocks: Tessellation, points: np.ndarray, became: np.ndarray) -> tuple[int, float, int, float]:
@@ -113,13 +153,25 @@ def _mark_straight_runs(points: np.ndarray, ring: list[int], kept: set[int], mar
 
 def outer_boundary(points: np.ndarray, rings: list[list[int]]) -> np.ndarray:
     """Corners (m, 2) of the largest closed curve of edges that belong to one block only, straight runs joined."""
+    best, largest = None, 0.0
+    for loop in _loops(rings):
+        xy = points[_turning(points, loop)]
+        area = polygons.signed_area(xy) if len(xy) > 2 else 0.0
+        if area > largest:
+            best, largest = xy, area
+    if best is None:
+        raise Refused("polygons with an outer boundary")
+    return best
+
+
+def _loops(rings: list[list[int]]) -> Iterator[list[int]]:
+    """Closed curves of the edges that belong to one ring only, with the rings on their left."""
     following = defaultdict(list)
     twins = {(b, a) for ring in rings for a, b in edges_of(ring)}
     for ring in rings:
         for a, b in edges_of(ring):
             if (a, b) not in twins:
                 following[a].append(b)
-    best, largest = None, 0.0
     while following:
         start = at = min(following)
         loop = []
@@ -132,13 +184,7 @@ def outer_boundary(points: np.ndarray, rings: list[list[int]]) -> np.ndarray:
             at = onward
             if at == start:
                 break
-        xy = points[_turning(points, loop)]
-        area = polygons.signed_area(xy) if len(xy) > 2 else 0.0
-        if area > largest:
-            best, largest = xy, area
-    if best is None:
-        raise Refused("polygons with an outer boundary")
-    return best
+        yield loop
 
 
 def _turning(points: np.ndarray, ring: list[int]) -> list[int]:
@@ -192,8 +238,8 @@ def _refuse_overlaps(points: np.ndarray, rings: list[list[int]]) -> None:
         raise Refused("polygons that do not overlap (their areas add up to more than the box around them)")
 
 
-def _merge_slivers(points, rings, thinnest: float, smallest: float) -> dict[int, list[int]]:
-    """The rings that are left, by the numbers of the given ones."""
+def _merge_slivers(points, rings, thinnest: float, smallest: float) -> tuple[dict[int, list[int]], int]:
+    """The rings that are left, by the numbers of the given ones, and how many slivers are among them."""
     area = np.array([polygons.signed_area(points[r]) for r in rings])
     limit = smallest * float(np.median(area))
     width = np.array([a / _longest(points[r]) for a, r in zip(area, rings)])
@@ -203,12 +249,16 @@ def _merge_slivers(points, rings, thinnest: float, smallest: float) -> dict[int,
             f"blocks that mending leaves: {100.0 * slim:.0f} % of the area lies in blocks narrower than "
             f"{thinnest:.4g} m, which join their neighbours; lower tessellation.thinnest, or widen the blocks"
         )
+
+    def sliver(ring: list[int]) -> bool:
+        xy = points[ring]
+        return polygons.signed_area(xy) < max(limit, thinnest * _longest(xy))
+
     alive: dict[int, list[int]] = dict(enumerate(rings))
     owner = {edge: k for k, ring in alive.items() for edge in edges_of(ring)}
     for k in np.argsort(area, kind="stable").tolist():
         ring = alive[k]
-        xy = points[ring]
-        if polygons.signed_area(xy) >= limit and polygons.signed_area(xy) >= thinnest * _longest(xy):
+        if not sliver(ring):
             continue
         shared: dict[int, float] = defaultdict(float)
         for a, b in edges_of(ring):
@@ -226,7 +276,7 @@ def _merge_slivers(points, rings, thinnest: float, smallest: float) -> dict[int,
             alive[other] = merged
             del alive[k]
             break
-    return {k: alive[k] for k in sorted(alive)}
+    return {k: alive[k] for k in sorted(alive)}, sum(sliver(ring) for ring in alive.values())
 
 
 def _longest(xy: np.ndarray) -> float:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -46,7 +46,8 @@ def edges_of(ring: list[int]) -> Iterator[tuple[int, int]]:
 @dataclass(frozen=True)
 class Mending:
     """What mending moved: corners and the farthest of their moves [m], joints turned and the largest turn [rad],
-    blocks merged into others and their area [m2]."""
+    blocks merged into others and their area [m2], slivers that stay since no neighbour makes one block with them, and
+    the largest change of the area of an opening [m2]."""
 
     corners: int = 0
     largest_move: float = 0.0
@@ -54,6 +55,8 @@ class Mending:
     largest_turn: float = 0.0
     blocks: int = 0
     area: float = 0.0
+    slivers: int = 0
+    opening: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -156,18 +159,25 @@ def from_polygons(shapes: list[np.ndarray], outline: np.ndarray) -> Tessellation
 
 def without(tessellation: Tessellation, holes: list[np.ndarray]) -> Tessellation:
     """The blocks whose centroid lies in none of the holes (polygons (m, 2) [m])."""
-    points, start, corner = tessellation.points, tessellation.start, tessellation.corner
-    _, centre = polygons.areas_and_centroids(points, start, corner)
-    gone = np.zeros(len(centre), dtype=bool)
-    for hole in holes:
-        gone |= polygons.inside(centre, hole)
+    gone = in_holes(tessellation.points, tessellation.rings, holes)
     if not gone.any():
         return tessellation
+    rings = [ring for ring, out in zip(tessellation.rings, gone) if not out]
+    return from_rings(tessellation.points, rings, tessellation.outline, tessellation.marks)
+
+
+def in_holes(points: np.ndarray, rings: list[list[int]], holes: Sequence[np.ndarray]) -> np.ndarray:
+    """Flags of the rings whose middle lies in a hole. Refused where none is left."""
+    gone = np.zeros(len(rings), dtype=bool)
+    if not holes:
+        return gone
+    start = np.cumsum([0, *map(len, rings)])
+    _, centre = polygons.areas_and_centroids(points, start, np.concatenate([np.array(r) for r in rings]))
+    for hole in holes:
+        gone |= polygons.inside(centre, hole)
     if gone.all():
         raise Refused("holes: no block is left")
-    rings = [ring for ring, out in zip(tessellation.rings, gone) if not out]
-    left = from_rings(points, rings, tessellation.outline, tessellation.marks)
-    return replace(left, mending=tessellation.mending)
+    return gone
 
 
 def _random_points(outline: np.ndarray, n: int, rng: np.random.Generator) -> np.ndarray:

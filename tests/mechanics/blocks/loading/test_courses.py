@@ -6,7 +6,7 @@ import pytest
 from graben.mechanics.blocks.contact.joints import Joint
 from graben.mechanics.blocks.engine.model import BlockModel, Damping
 from graben.mechanics.blocks.loading.biaxial import Courses, compress, consolidate
-from graben.mechanics.blocks.loading.courses import Course
+from graben.mechanics.blocks.loading.courses import Clock, Course
 from graben.mechanics.blocks.record.history import History, mean_stress
 from graben.mechanics.blocks.shape.bodies import build_bodies
 from graben.mechanics.blocks.shape.tessellation import from_polygons, voronoi_blocks
@@ -26,6 +26,28 @@ def test_a_course_jumps_and_keeps_its_ends():
     for points in ([], [(1.0, 0.0), (0.0, 0.0)], [(0.0, np.nan)]):
         with pytest.raises(ValueError, match="course"):
             Course(points)
+
+
+def test_a_clock_stands_while_a_load_jumps():
+    """Two jumps of one load, one of another at the same time as the second; a third load has no jump."""
+    one = Course([(0.0, 0.0), (2.0, 1.0), (2.0, 5.0), (4.0, 5.0), (4.0, 2.0)], 1.0)
+    two = Course([(0.0, 7.0), (4.0, 7.0), (4.0, 9.0)])
+    even = Course([(0.0, 0.0)], 0.5)
+    clock = Clock([one, two, even], 10.0, 1.0)
+    assert clock.jumps.tolist() == [2.0, 4.0] and clock.end == 12.0
+    readings = np.array([0.0, 2.0, 2.5, 3.0, 4.0, 5.0, 5.5, 6.0, 12.0])
+    assert clock.time(readings).tolist() == [0.0, 2.0, 2.0, 2.0, 3.0, 4.0, 4.0, 4.0, 10.0]
+    assert [clock.reading(t) for t in (0.0, 2.0, 3.0, 4.0, 10.0)] == [0.0, 2.0, 4.0, 5.0, 12.0]
+    for course, middles in ((one, (3.0, 3.5)), (two, (7.0, 8.0)), (even, (1.0, 2.0))):
+        slow = clock.stretched(course)
+        assert np.diff(slow.times).min(initial=1.0) > 0.0
+        assert [slow.at(2.5), slow.at(5.5)] == pytest.approx(middles)
+        for reading in (0.5, 1.5, 3.5, 4.5, 6.5, 11.0):
+            assert slow.at(reading) == pytest.approx(course.at(float(clock.time(reading))))
+    alone = Clock([even], 10.0, 1.0)
+    assert alone.end == 10.0 and alone.stretched(even) is even and alone.time(3.0) == 3.0
+    # What jumps at the start is there at the start.
+    assert len(Clock([Course([(0.0, 1.0), (0.0, 3.0)])], 10.0, 1.0).jumps) == 0
 
 
 def loaded(bodies, joint, courses, steps=6000, states=31, **more):
