@@ -52,9 +52,10 @@ def size_of(scene: Any, inputs: Sequence[Path] = ()) -> Size:
 
 
 def _blocks(scene: Any, inputs: list[Path]) -> list[Estimate]:
+    from graben.stages.blocks.extent import extent_of, map_of
     from graben.stages.blocks.sizes import sizes_of
 
-    return sizes_of(scene)
+    return sizes_of(scene, extent_of(scene, map_of(scene)))
 
 
 def _particles(scene: Any, inputs: list[Path]) -> list[Estimate]:

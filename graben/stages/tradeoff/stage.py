@@ -29,6 +29,9 @@ COMMANDS = {
     "scratch": "scratch", "wear": "wear-estimate",
 }  # fmt: skip
 
+# Values that do not go from coarse to fine make the last point cheaper than the first, by more than noise.
+_CHEAPER = 0.7
+
 RUNS = ".runs"
 """What the folder of runs is called, after the name of the artifact."""
 
@@ -254,7 +257,7 @@ def _doubts(
     told = {text for run in table[-1] for text in run.headline.get("warnings", [])}
     if base.origin != "given":
         said += [f"the finest run warns: {text}" for text in sorted(told)]
-    if len(points) > 1 and cpu[-1].mean() < cpu[0].mean():
+    if len(points) > 1 and cpu[-1].mean() < _CHEAPER * cpu[0].mean():
         said.append("the last point costs less than the first: values go from coarse to fine")
     if wanted is not None and best is None:
         said.append(f"no point is known to be within {100 * wanted:.3g} %")
