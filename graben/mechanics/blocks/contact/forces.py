@@ -19,6 +19,7 @@ from graben.mechanics.blocks.contact.joints import (
 from graben.mechanics.blocks.contact.nodes import LENGTH, RIM, TX, TY, VX, VY, X, Y
 from graben.mechanics.cache_lines import ask_for
 from graben.mechanics.compiled import kernel
+from graben.mechanics.unsigned import span
 
 # Rows between the one in work and the one whose data are asked for.
 _AHEAD = 6
@@ -31,7 +32,7 @@ LIVE, INTACT, MARK_COLUMNS = 2, 3, 4
 class Rows(NamedTuple):
     """Awake pairs in the order of work, so that memory is read in order; their memory lives here while stepping.
 
-    edge : (n, 8) int32, the two edges, the nodes where they end, the pair, and the row of Motion.far or -1
+    edge : (n, 8) uint32, the two edges, the nodes where they end, the pair, and the row of Motion.far or -1
     hold : (n, 4) shear stress at both ends [Pa], slip at both ends [m]; mark : (n, 4) int8, state of both ends,
     whether live, whether intact at the start; seat : (n, 2) as of Pairs, or (0, 2)
     """
@@ -45,7 +46,7 @@ class Rows(NamedTuple):
 def empty_rows(n: int, seated: bool = False) -> Rows:
     """Rows for up to n pairs, with seats or without."""
     return Rows(
-        np.zeros((n, EDGE_COLUMNS), dtype=np.int32),
+        np.zeros((n, EDGE_COLUMNS), dtype=np.uint32),
         np.zeros((n, 4)),
         np.zeros((n, MARK_COLUMNS), dtype=np.int8),
         np.zeros((n if seated else 0, 2)),
@@ -79,7 +80,7 @@ def settle_rows(rows, begin, end, pairs):
     """What rows begin to end remember goes back to their pairs."""
     edge, hold, mark = rows.edge, rows.hold, rows.mark
     shear, slip, flag, live = pairs.shear, pairs.slip, pairs.flag, pairs.live
-    for r in range(begin, end):
+    for r in span(begin, end):
         c = edge[r, PAIR]
         for k in range(2):
             shear[c, k] = hold[r, k]
@@ -167,9 +168,10 @@ def contact_forces(rows, begin, stop, node, table, joint, deepest, dt, fn, node_
     ksdt = ks * dt
     friction_work = 0.0
     largest = sums[1]
-    for m in range(begin, stop):
+    last = np.uint64(max(stop, 1) - 1)
+    for m in span(begin, stop):
         # Edges face each other in no order of memory: ask early for what is due some rows later.
-        r = min(m + _AHEAD, stop - 1)
+        r = min(m + np.uint64(_AHEAD), last)
         ask_for(node, edge[r, E])
         ask_for(node, edge[r, F])
         ask_for(node, edge[r, F_END])

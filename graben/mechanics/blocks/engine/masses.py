@@ -79,6 +79,21 @@ class Masses(NamedTuple):
         return self._replace(block=block)
 
 
+class Gains(NamedTuple):
+    """What a step works out for every vertex and block, once for all steps, because divisions are dear.
+
+    vertex : (vertices,) dt / mass; block : (blocks,) what inertia leaves out of the motion of the centre
+    """
+
+    vertex: np.ndarray
+    block: np.ndarray
+
+
+def gains(masses: Masses, dt: float) -> Gains:
+    """The gains of masses in steps of dt [s]."""
+    return Gains(dt / masses.vertex, _left_out(masses.block[:, LIGHTER], masses.block[:, WHOLE]))
+
+
 def of_rigid(block: np.ndarray, vertex: np.ndarray, first: np.ndarray) -> Masses:
     """Shares (vertices,) of the masses (blocks,) of rigid blocks, which move by laws of their own."""
     table = np.zeros((len(block), 3))

@@ -290,7 +290,7 @@ class BlockModel(ModelState):
         """Masses by constraints and damping; local damping looks at vertices, not at blocks."""
         local = self.damping.local
         mass = self.masses.plain(local, self.scaled) if local > 0.0 else self.masses.held(self.skeleton.still[:, 0])
-        self.skeleton = self.skeleton._replace(mass=mass)
+        self.skeleton = self.skeleton._replace(mass=mass, gains=masses.gains(mass, self.dt))
 
     def set_load(self, factor: float, per_step: float = 0.0) -> None:
         """The rising load counts `factor` times now, and by `per_step` more after each step."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from graben.mechanics.blocks.contact.forces import Rows
-from graben.mechanics.blocks.engine.masses import Masses
+from graben.mechanics.blocks.engine.masses import Gains, Masses
 
 # Slots of Motion.drive: the coefficient of global damping [1/s]; what the rising load and the prescribed speeds are
 # multiplied by, and how much that grows a step (speeds: up to 1); by how much the load falls per unit of its way.
@@ -26,7 +26,7 @@ class Skeleton(NamedTuple):
     """What does not change while stepping: zones, contact nodes, masses, constraints and loads.
 
     zones : ElasticZones, or another law of zones/; first, second, weight, follow : contact nodes
-    mass : see masses.py; still : (k, 2) vertex and axis of prescribed velocities, wall : (vertices, 2) [m/s];
+    mass, gains : see masses.py; still : (k, 2) vertex and axis of prescribed velocities, wall : (vertices, 2) [m/s];
     still_start : (parts + 1,) where those of each part begin
     steady, rising : (vertices, 2) forces [N/m]; the load is steady + drive[LOAD] * rising, the velocity of
     still vertices drive[SPEED] * wall
@@ -38,6 +38,7 @@ class Skeleton(NamedTuple):
     weight: np.ndarray
     follow: np.ndarray
     mass: Masses
+    gains: Gains
     still: np.ndarray
     still_start: np.ndarray
     wall: np.ndarray
@@ -49,7 +50,7 @@ class Motion(NamedTuple):
     """What changes: positions and velocities of vertices and of contact nodes, forces, running sums, and who sleeps.
 
     x, v, zone_force, joint_force, reaction : (vertices, 2); node : node table (nodes, 8); fn : (nodes, 2)
-    ledger, drive : numbers in the slots above
+    ledger, drive : numbers in the slots above; burdened : (blocks,) int8, 1 for those under a load (while stepping)
     From start on (sleeping.py): which candidates are awake, part by part, and when to look at each of them again.
     start : (parts + 1,) first candidate of each part, that of its first edge; awake ones have rows (valid while
     stepping, between `begin` and `end`), those of part p and set of joints s from turn[p, s] to turn[p, s + 1]
@@ -70,6 +71,7 @@ class Motion(NamedTuple):
     fn: np.ndarray
     ledger: np.ndarray
     drive: np.ndarray
+    burdened: np.ndarray
     start: np.ndarray
     rows: Rows
     turn: np.ndarray
