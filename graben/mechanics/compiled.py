@@ -31,8 +31,8 @@ _IMPORTS = re.compile(rb"^[ \t]*(" + _FROM + rb"|import[ \t][^\n]*\bgraben\b[^\n
 def kernel(function: Callable[..., Any] | None = None, *, pairing: bool = False, **options: Any) -> Any:
     """Compile `function` in nopython mode with the cache described above; options are those of numba.njit.
 
-    pairing : like operations on neighbouring numbers, x and y say, become one on both (SLP vectorization). C compilers
-    do so by default and numba does not. Results stay the same, bit for bit. It reaches what is called from there.
+    pairing : like operations on neighbouring numbers, x and y say, become one on both (SLP vectorization). Compilers
+    of C do so by default, numba does not. Results stay the same, bit for bit. It reaches all that is called there.
     """
     if function is None:
         return lambda f: kernel(f, pairing=pairing, **options)

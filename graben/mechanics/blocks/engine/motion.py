@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numba.extending import overload
 
 from graben.mechanics.blocks.engine.masses import LIGHTER, NIMBLER, WHOLE
@@ -41,7 +40,7 @@ def move_vertices(p, s, m, parts, load, alpha, local, dt, speed, sums):
 
     Masses are those of `masses.Masses`: each block has a rigid part that is lighter than its vertices.
     """
-    x, v, zone, joint, burdened = m.x, m.v, m.zone_force, m.joint_force, m.burdened
+    x, v, zone, joint, burdened = m.x, m.v, m.zone_force, m.joint_force, s.gains.burdened
     steady, rising, still = s.steady, s.rising, s.still
     mass, first, block, pushes, share = s.mass.vertex, s.mass.first, s.mass.block, s.gains.vertex, s.gains.block
     slow = 1.0 - 0.5 * alpha * dt
@@ -140,9 +139,9 @@ def move_vertices(p, s, m, parts, load, alpha, local, dt, speed, sums):
 
 
 @kernel(error_model="numpy")
-def list_burdened(s, burdened):
-    """Flag the blocks (blocks,) in order of storage with a load, steady or rising, on some vertex."""
-    steady, rising, first = s.steady, s.rising, s.mass.first
+def list_burdened(s):
+    """Flag the blocks with a load, steady or rising, on some vertex."""
+    steady, rising, first, burdened = s.steady, s.rising, s.mass.first, s.gains.burdened
     for b in range(len(burdened)):
         burdened[b] = 0
         for i in range(first[b], first[b + 1]):
@@ -154,10 +153,10 @@ def list_burdened(s, burdened):
 @kernel(error_model="numpy")
 def _is_held(still, row, last_row, i, d):
     """Whether the velocity of vertex i along axis d is among rows of still."""
+    found = False
     for k in span(row, last_row):
-        if still[k, 0] == i and still[k, 1] == d:
-            return True
-    return False
+        found |= still[k, 0] == i and still[k, 1] == d
+    return found
 
 
 @kernel(error_model="numpy")

@@ -50,7 +50,7 @@ class Motion(NamedTuple):
     """What changes: positions and velocities of vertices and of contact nodes, forces, running sums, and who sleeps.
 
     x, v, zone_force, joint_force, reaction : (vertices, 2); node : node table (nodes, 8); fn : (nodes, 2)
-    ledger, drive : numbers in the slots above; burdened : (blocks,) int8, 1 for those under a load (while stepping)
+    ledger, drive : numbers in the slots above
     From start on (sleeping.py): which candidates are awake, part by part, and when to look at each of them again.
     start : (parts + 1,) first candidate of each part, that of its first edge; awake ones have rows (valid while
     stepping, between `begin` and `end`), those of part p and set of joints s from turn[p, s] to turn[p, s + 1]
@@ -71,7 +71,6 @@ class Motion(NamedTuple):
     fn: np.ndarray
     ledger: np.ndarray
     drive: np.ndarray
-    burdened: np.ndarray
     start: np.ndarray
     rows: Rows
     turn: np.ndarray

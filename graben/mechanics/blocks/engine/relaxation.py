@@ -105,7 +105,7 @@ def _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums):
 def begin(s, m, pairs):
     """Before `advance`: node table, rows and loaded blocks of the present state; a look is due if somebody moved
     nodes since."""
-    list_burdened(s, m.burdened)
+    list_burdened(s)
     x, v, node = m.x, m.v, m.node
     first, second, weight = s.first, s.second, s.weight
     for i in range(node.shape[0]):

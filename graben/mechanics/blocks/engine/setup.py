@@ -139,7 +139,6 @@ def at_rest(bodies: Bodies, skin: Skin, parts: Parts) -> Motion:
         aligned(nn, 2),
         np.zeros(LEDGER_SLOTS),
         np.zeros(DRIVE_SLOTS),
-        np.zeros(int(parts.block[-1]), dtype=np.int8),
         **none,
     )
     x = bodies.position

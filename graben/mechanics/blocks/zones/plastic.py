@@ -14,9 +14,9 @@ import numpy as np
 
 from graben.mechanics.blocks.zones.elastic import ElasticZones
 from graben.mechanics.compiled import kernel
-from graben.mechanics.unsigned import span
 from graben.mechanics.materials.laws import pack
 from graben.mechanics.materials.mohr_coulomb import update_mohr_coulomb
+from graben.mechanics.unsigned import span
 
 # What a zone does: elastic so far; yields now, by shear or by tension; yielded before; its law found no stress.
 ELASTIC, SHEAR, TENSION, PAST, LOST = 0, 1, 2, 3, 4
