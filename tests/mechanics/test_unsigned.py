@@ -1,12 +1,13 @@
 """Unsigned ranges, and operations side by side: the same numbers as without."""
 
+import numba
 import numpy as np
 
-from graben.mechanics.compiled import kernel
+from graben.mechanics.compiled import _with_pairing
 from graben.mechanics.unsigned import span
 
 
-@kernel(error_model="numpy")
+@numba.njit
 def _listed(begin, end):
     out = np.zeros(10, dtype=np.int64)
     for k in span(begin, end):
@@ -30,5 +31,9 @@ def test_pairing_changes_no_bit():
     x = np.random.default_rng(1).normal(size=(100, 2))
     out = np.zeros((2, 100, 2))
     for k, pairing in enumerate((False, True)):
-        kernel(_turned, pairing=pairing, error_model="numpy")(x, 0.8, 0.6, out[k])
+        turned = numba.njit(_turned)
+        if pairing:
+            turned._compiler.compile = _with_pairing(turned._compiler.compile)
+        turned(x, 0.8, 0.6, out[k])
+    assert numba.config.SLP_VECTORIZE == 0
     assert out[0].tobytes() == out[1].tobytes() and out.any()

@@ -35,6 +35,6 @@ def test_a_batch_gives_bitwise_what_its_rows_give_alone(joint):
             )
             assert bad == -1
         found.append((fn, rows.hold, rows.mark, sums))
-    assert np.abs(found[0][0]).max() > 1e3 and found[0][3][0] > 0.0
+    assert np.abs(found[0][0]).max() > 1e3
     for together, alone in zip(*found, strict=True):
         assert together.tobytes() == alone.tobytes()
