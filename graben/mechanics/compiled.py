@@ -28,13 +28,33 @@ _FROM = rb"from[ \t]+graben[\w.]*[ \t]+import[ \t]*(?:\([^)]*\)|(?:[^\n(\\]|\\\n
 _IMPORTS = re.compile(rb"^[ \t]*(" + _FROM + rb"|import[ \t][^\n]*\bgraben\b[^\n]*)", re.MULTILINE)
 
 
-def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """Compile `function` in nopython mode with the cache described above; options are those of numba.njit."""
+def kernel(function: Callable[..., Any] | None = None, *, pairing: bool = False, **options: Any) -> Any:
+    """Compile `function` in nopython mode with the cache described above; options are those of numba.njit.
+
+    pairing : like operations on neighbouring numbers, x and y say, become one on both (SLP vectorization). Compilers
+    of C do so by default, numba does not. Results stay the same, bit for bit. It reaches all that is called there.
+    """
     if function is None:
-        return lambda f: kernel(f, **options)
+        return lambda f: kernel(f, pairing=pairing, **options)
     dispatcher = numba.njit(**options)(function)
-    dispatcher._cache = _cache_of(function, options)
+    dispatcher._cache = _cache_of(function, options | {"pairing": True} if pairing else options)
+    if pairing:
+        dispatcher._compiler.compile = _with_pairing(dispatcher._compiler.compile)
     return dispatcher
+
+
+def _with_pairing(compile_: Callable[..., Any]) -> Callable[..., Any]:
+    """numba's compilation (under its lock) with its setting for pairing, which is one for all kernels, turned on."""
+
+    def paired(*arguments: Any) -> Any:
+        before = numba.config.SLP_VECTORIZE
+        numba.config.SLP_VECTORIZE = 1
+        try:
+            return compile_(*arguments)
+        finally:
+            numba.config.SLP_VECTORIZE = before
+
+    return paired
 
 
 def c_kernel(signature: str, function: Callable[..., Any], **options: Any) -> Any:

@@ -1,4 +1,8 @@
-"""Forces of the awake pairs of edges, from rows that hold all that a pair remembers."""
+"""Forces of the awake pairs of edges, from rows that hold all that a pair remembers.
+
+Rows go in batches: `_collect` copies what they need into columns, `lanes.press_batch` works out all lanes of these,
+and `_hand_out` takes the results to rows and nodes, in the order of the rows.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from graben.mechanics.blocks.contact.joints import (
-    BROKEN,
-    FACING_FULL,
-    FACING_NONE,
-    OPEN,
-    SLIP,
-    STICK,
-    bearing,
-    closure_stress,
-)
+from graben.mechanics.blocks.contact import lanes
+from graben.mechanics.blocks.contact.joints import BROKEN, OPEN, SLIP, STICK
 from graben.mechanics.blocks.contact.nodes import LENGTH, RIM, TX, TY, VX, VY, X, Y
 from graben.mechanics.cache_lines import ask_for
 from graben.mechanics.compiled import kernel
+from graben.mechanics.unsigned import span
 
 # Rows between the one in work and the one whose data are asked for.
-_AHEAD = 6
+_AHEAD = 16
 
 # Columns of Rows.edge and of Rows.mark.
 E, F, E_END, F_END, PAIR, FAR, EDGE_COLUMNS = 0, 1, 2, 3, 4, 5, 8
@@ -31,7 +28,7 @@ LIVE, INTACT, MARK_COLUMNS = 2, 3, 4
 class Rows(NamedTuple):
     """Awake pairs in the order of work, so that memory is read in order; their memory lives here while stepping.
 
-    edge : (n, 8) int32, the two edges, the nodes where they end, the pair, and the row of Motion.far or -1
+    edge : (n, 8) uint32, the two edges, the nodes where they end, the pair, and the row of Motion.far if it has one
     hold : (n, 4) shear stress at both ends [Pa], slip at both ends [m]; mark : (n, 4) int8, state of both ends,
     whether live, whether intact at the start; seat : (n, 2) as of Pairs, or (0, 2)
     """
@@ -45,7 +42,7 @@ class Rows(NamedTuple):
 def empty_rows(n: int, seated: bool = False) -> Rows:
     """Rows for up to n pairs, with seats or without."""
     return Rows(
-        np.zeros((n, EDGE_COLUMNS), dtype=np.int32),
+        np.zeros((n, EDGE_COLUMNS), dtype=np.uint32),
         np.zeros((n, 4)),
         np.zeros((n, MARK_COLUMNS), dtype=np.int8),
         np.zeros((n if seated else 0, 2)),
@@ -79,7 +76,7 @@ def settle_rows(rows, begin, end, pairs):
     """What rows begin to end remember goes back to their pairs."""
     edge, hold, mark = rows.edge, rows.hold, rows.mark
     shear, slip, flag, live = pairs.shear, pairs.slip, pairs.flag, pairs.live
-    for r in range(begin, end):
+    for r in span(begin, end):
         c = edge[r, PAIR]
         for k in range(2):
             shear[c, k] = hold[r, k]
@@ -100,48 +97,119 @@ def forget(shear, flag, intact, c):
                 flag[c, k] = OPEN
 
 
-@kernel(error_model="numpy", forceinline=True)
-def _end_law(tau, slip, mark, whole, gap, gain, kn, compliance, strengths, tensile, dilation, limit, closure):
-    """One end of a contact: new shear stress, slip and state, normal stress, and work lost (per area).
+@kernel(error_model="numpy")
+def _collect(w, rows, begin, stop, node):
+    """Copy what rows begin to stop and their nodes hold into the lanes of the work space."""
+    edge, hold, mark, seat = rows.edge, rows.hold, rows.mark, rows.seat
+    seated = seat.shape[0] > 0
+    last = np.uint64(max(edge.shape[0], 1) - 1)
+    j = np.uint64(0)
+    for m in span(begin, stop):
+        # Edges face each other in no order of memory: ask early for what is due some rows later.
+        r = min(m + np.uint64(_AHEAD), last)
+        ask_for(node, edge[r, E])
+        ask_for(node, edge[r, F])
+        ask_for(node, edge[r, F_END])
+        e, f, d, g = edge[m, E], edge[m, F], edge[m, E_END], edge[m, F_END]
+        w[j + np.uint64(lanes.EX)] = node[e, X]
+        w[j + np.uint64(lanes.EY)] = node[e, Y]
+        w[j + np.uint64(lanes.EVX)] = node[e, VX]
+        w[j + np.uint64(lanes.EVY)] = node[e, VY]
+        w[j + np.uint64(lanes.ETX)] = node[e, TX]
+        w[j + np.uint64(lanes.ETY)] = node[e, TY]
+        w[j + np.uint64(lanes.EL)] = node[e, LENGTH]
+        w[j + np.uint64(lanes.RIM)] = node[e, RIM] + node[f, RIM]
+        w[j + np.uint64(lanes.FX)] = node[f, X]
+        w[j + np.uint64(lanes.FY)] = node[f, Y]
+        w[j + np.uint64(lanes.FVX)] = node[f, VX]
+        w[j + np.uint64(lanes.FVY)] = node[f, VY]
+        w[j + np.uint64(lanes.FTX)] = node[f, TX]
+        w[j + np.uint64(lanes.FTY)] = node[f, TY]
+        w[j + np.uint64(lanes.GX)] = node[g, X]
+        w[j + np.uint64(lanes.GY)] = node[g, Y]
+        w[j + np.uint64(lanes.GVX)] = node[g, VX]
+        w[j + np.uint64(lanes.GVY)] = node[g, VY]
+        w[j + np.uint64(lanes.DVX)] = node[d, VX]
+        w[j + np.uint64(lanes.DVY)] = node[d, VY]
+        w[j + np.uint64(lanes.TAU0)] = hold[m, 0]
+        w[j + np.uint64(lanes.TAU1)] = hold[m, 1]
+        w[j + np.uint64(lanes.SLIP0)] = hold[m, 2]
+        w[j + np.uint64(lanes.SLIP1)] = hold[m, 3]
+        intact = mark[m, INTACT] == 1
+        w[j + np.uint64(lanes.WHOLE0)] = 1.0 if intact and mark[m, 0] != BROKEN else 0.0
+        w[j + np.uint64(lanes.WHOLE1)] = 1.0 if intact and mark[m, 1] != BROKEN else 0.0
+        w[j + np.uint64(lanes.PLAIN)] = 1.0 if not seated and not intact else 0.0
+        if seated:
+            w[j + np.uint64(lanes.SEAT0)] = seat[m, 0]
+            w[j + np.uint64(lanes.SEAT1)] = seat[m, 1]
+        j += np.uint64(1)
 
-    gap [m]; gain : what sliding in this step adds to the shear stress [Pa]; whole : intact and not broken
-    strengths : friction, cohesion; and residual ones, friction below 0 if the joint does not weaken
+
+@kernel(error_model="numpy", forceinline=True)
+def _mark(mark, end, whole, brittle):
+    """New mark of an end from its old one; brittle : whole joints that open are broken for good."""
+    if mark == BROKEN or end == BROKEN:
+        return BROKEN
+    if end == OPEN:
+        return BROKEN if whole and brittle else OPEN
+    return STICK if end == STICK else SLIP
+
+
+@kernel(error_model="numpy")
+def _hand_out(w, rows, begin, stop, brittle, deepest, fn, node_end, far):
+    """Take the results of a batch to rows begin to stop, nodes and the sums over batches.
+
+    brittle : whole joints that open are broken for good. Returns the pair that overlaps too much, or -1.
     """
-    friction, cohesion, residual_friction, residual_cohesion = strengths
-    weakens = residual_friction >= 0.0
-    opened = dilation * min(abs(slip), limit)
-    closed = opened - gap
-    sigma = kn * closed
-    if closure > 0.0 and closed > 0.0:
-        sigma = closure_stress(closed, kn, closure)[0]
-    tension = tensile if whole else 0.0
-    if sigma <= -tension:
-        # What the joint stored is lost with it.
-        lost = tau * tau * compliance
-        if tension > 0.0:
-            lost += sigma * sigma / kn
-        if mark != BROKEN:
-            mark = BROKEN if whole and (tension > 0.0 or weakens) else OPEN
-        return 0.0, slip, mark, 0.0, 0.5 * lost
-    if weakens and not whole:
-        friction = residual_friction
-        cohesion = residual_cohesion
-    tau += gain
-    strength = max(cohesion + sigma * friction, 0.0)
-    work = 0.0
-    if weakens and whole and abs(tau) > strength:
-        # It breaks: strength falls at once, and with it what it stored.
-        strength = max(residual_cohesion + sigma * residual_friction, 0.0)
-        work = 0.5 * compliance * (abs(tau) - strength) ** 2
-        mark = BROKEN
-    # No branch on sliding: nobody could foretell it.
-    limited = min(max(tau, -strength), strength)
-    slid = (tau - limited) * compliance
-    slip += slid
-    work += limited * slid - sigma * (dilation * min(abs(slip), limit) - opened)
-    if mark != BROKEN:
-        mark = STICK if tau == limited else SLIP
-    return limited, slip, mark, sigma, work
+    edge, hold, mark = rows.edge, rows.hold, rows.mark
+    whole_at_start = mark[:, INTACT]
+    lost, largest = w[lanes.LOST], w[lanes.DEEPEST]
+    j = -1
+    for m in span(begin, stop):
+        j += 1
+        fate = w[lanes.FATE + j]
+        if fate == lanes.AWAY:
+            if mark[m, LIVE] == 1:
+                forget(hold, mark, whole_at_start, m)
+                mark[m, LIVE] = 0
+            continue
+        if fate == lanes.APART:
+            if mark[m, LIVE] == 0 or mark[m, 0] != OPEN or mark[m, 1] != OPEN:
+                forget(hold, mark, whole_at_start, m)
+                mark[m, LIVE] = 1
+            continue
+        if w[lanes.OVERLAP + j] > deepest:
+            if mark[m, LIVE] == 1:
+                w[lanes.LOST], w[lanes.DEEPEST] = lost, w[lanes.OVERLAP + j]
+                return edge[m, PAIR]
+            continue
+        hold[m, 0] = w[lanes.TAU0 + j]
+        hold[m, 1] = w[lanes.TAU1 + j]
+        hold[m, 2] = w[lanes.SLIP0 + j]
+        hold[m, 3] = w[lanes.SLIP1 + j]
+        mark[m, 0] = _mark(mark[m, 0], w[lanes.END0 + j], w[lanes.WHOLE0 + j] != 0.0, brittle)
+        mark[m, 1] = _mark(mark[m, 1], w[lanes.END1 + j], w[lanes.WHOLE1 + j] != 0.0, brittle)
+        mark[m, LIVE] = 1
+        lost += w[lanes.WORK + j]
+        largest = max(largest, -w[lanes.GAP0 + j], -w[lanes.GAP1 + j])
+        e, f, d, g = edge[m, E], edge[m, F], edge[m, E_END], edge[m, F_END]
+        fn[e, 0] += w[lanes.PX + j]
+        fn[e, 1] += w[lanes.PY + j]
+        fn[d, 0] += w[lanes.QX + j]
+        fn[d, 1] += w[lanes.QY + j]
+        if f < node_end:
+            fn[f, 0] += w[lanes.RX + j]
+            fn[f, 1] += w[lanes.RY + j]
+            fn[g, 0] += w[lanes.SX + j]
+            fn[g, 1] += w[lanes.SY + j]
+        else:
+            row = edge[m, FAR]
+            far[row, 0] = w[lanes.RX + j]
+            far[row, 1] = w[lanes.RY + j]
+            far[row, 2] = w[lanes.SX + j]
+            far[row, 3] = w[lanes.SY + j]
+    w[lanes.LOST], w[lanes.DEEPEST] = lost, largest
+    return -1
 
 
 @kernel(error_model="numpy")
@@ -154,165 +222,17 @@ def contact_forces(rows, begin, stop, node, table, joint, deepest, dt, fn, node_
     deepest : overlap above which a touching pair stops the run, and others are no contact [m]
     sums : [friction work, largest overlap], added to; the work that dilation gives back is not friction
     """
-    # Taken out of the tuple once: inside the loop each look-up would count references.
-    edge, hold, mark, seat = rows.edge, rows.hold, rows.mark, rows.seat
-    seated = seat.shape[0] > 0
-    seat0 = 0.0
-    seat1 = 0.0
-    whole_at_start = mark[:, INTACT]
-    kn, ks = table[joint, 0], table[joint, 1]
-    strengths = (table[joint, 2], table[joint, 3], table[joint, 7], table[joint, 8])
-    tensile, dilation, limit, closure = table[joint, 4], table[joint, 5], table[joint, 6], table[joint, 9]
-    face = table[joint, 10]
-    shortest = 1.7 if face == 0.0 else 1.0
-    compliance = 1.0 / ks
-    ksdt = ks * dt
-    friction_work = 0.0
-    largest = sums[1]
-    for m in range(begin, stop):
-        # Edges face each other in no order of memory: ask early for what is due some rows later.
-        r = min(m + _AHEAD, stop - 1)
-        ask_for(node, edge[r, E])
-        ask_for(node, edge[r, F])
-        ask_for(node, edge[r, F_END])
-        e = edge[m, E]
-        f = edge[m, F]
-        # Difference of the unit tangents: along the common tangent, of length sqrt(2 + 2 facing). All lengths
-        # along it, and heights above it, are stretched by that.
-        tx = node[e, TX] - node[f, TX]
-        ty = node[e, TY] - node[f, TY]
-        square = tx * tx + ty * ty
-        facing = 0.5 * square - 1.0
-        if facing <= FACING_NONE:
-            if mark[m, LIVE] == 1:
-                forget(hold, mark, whole_at_start, m)
-                mark[m, LIVE] = 0
-            continue
-        if face == 1.0:
-            tx, ty, square = node[e, TX], node[e, TY], 1.0
-        elif face == 2.0:
-            tx, ty, square = -node[f, TX], -node[f, TY], 1.0
-        e2 = edge[m, E_END]
-        f2 = edge[m, F_END]
-        ox = node[e, X]
-        oy = node[e, Y]
-        # Along the tangent: edge e runs from 0 to se, edge f from s1 (its end) to s0 (its start).
-        se = node[e, LENGTH] * (node[e, TX] * tx + node[e, TY] * ty)
-        s0 = (node[f, X] - ox) * tx + (node[f, Y] - oy) * ty
-        s1 = (node[f2, X] - ox) * tx + (node[f2, Y] - oy) * ty
-        low = max(0.0, s1)
-        high = min(se, s0)
-        rim = node[e, RIM] + node[f, RIM]
-        # They are stretched by at least sqrt(3), or not at all.
-        if high - low <= shortest * rim:
-            if mark[m, LIVE] == 1:
-                forget(hold, mark, whole_at_start, m)
-                mark[m, LIVE] = 0
-            continue
-        # Heights along the normal n = (ty, -tx), which points out of edge e.
-        he = node[e, LENGTH] * (node[e, TX] * ty - node[e, TY] * tx)
-        h0 = (node[f, X] - ox) * ty - (node[f, Y] - oy) * tx
-        h1 = (node[f2, X] - ox) * ty - (node[f2, Y] - oy) * tx
-        slip0 = hold[m, 2]
-        slip1 = hold[m, 3]
-        if seated:
-            seat0 = seat[m, 0]
-            seat1 = seat[m, 1]
-        elif min(h0, h1) > max(0.0, he) and mark[m, INTACT] == 0 and slip0 == 0.0 and slip1 == 0.0:
-            # Pairs apart that never slid end here, before any root or division.
-            if mark[m, LIVE] == 0 or mark[m, 0] != OPEN or mark[m, 1] != OPEN:
-                forget(hold, mark, whole_at_start, m)
-                mark[m, LIVE] = 1
-            continue
-        # One division serves all three inverse lengths.
-        sf = s0 - s1
-        stretch = np.sqrt(square)
-        share = 1.0 / (se * sf * square)
-        de = sf * square * share
-        df = se * square * share
-        scale = se * sf * share * stretch
-        alpha0 = low * de
-        alpha1 = high * de
-        beta0 = (s0 - low) * df
-        beta1 = (s0 - high) * df
-        gap0 = scale * (h0 + (h1 - h0) * beta0 - he * alpha0)
-        gap1 = scale * (h0 + (h1 - h0) * beta1 - he * alpha1)
-        overlap = -0.5 * (gap0 + gap1)
-        if overlap > deepest:
-            if mark[m, LIVE] == 1:
-                sums[0] += friction_work
-                sums[1] = overlap
-                return edge[m, PAIR]
-            continue
-        area = 0.5 * bearing(scale * (high - low), gap0, gap1, rim)
-        if facing < FACING_FULL:
-            area *= (facing - FACING_NONE) / (FACING_FULL - FACING_NONE)
-        tx *= scale
-        ty *= scale
-        de *= stretch
-        df *= stretch
-        # Sliding speeds along the tangent, at both ends.
-        ve = node[e, VX] * tx + node[e, VY] * ty
-        ve2 = node[e2, VX] * tx + node[e2, VY] * ty
-        vf = node[f, VX] * tx + node[f, VY] * ty
-        vf2 = node[f2, VX] * tx + node[f2, VY] * ty
-        gain0 = ksdt * (vf + beta0 * (vf2 - vf) - ve - alpha0 * (ve2 - ve))
-        gain1 = ksdt * (vf + beta1 * (vf2 - vf) - ve - alpha1 * (ve2 - ve))
-        intact = mark[m, INTACT] == 1
-        mark0 = mark[m, 0]
-        mark1 = mark[m, 1]
-        whole0 = intact and mark0 != BROKEN
-        whole1 = intact and mark1 != BROKEN
-        tau0, slip0, mark0, sigma0, work0 = _end_law(
-            hold[m, 0], slip0, mark0, whole0, gap0 - seat0, gain0,
-            kn, compliance, strengths, tensile, dilation, limit, closure,
-        )  # fmt: skip
-        tau1, slip1, mark1, sigma1, work1 = _end_law(
-            hold[m, 1], slip1, mark1, whole1, gap1 - seat1, gain1,
-            kn, compliance, strengths, tensile, dilation, limit, closure,
-        )  # fmt: skip
-        hold[m, 0] = tau0
-        hold[m, 1] = tau1
-        hold[m, 2] = slip0
-        hold[m, 3] = slip1
-        mark[m, 0] = mark0
-        mark[m, 1] = mark1
-        mark[m, LIVE] = 1
-        friction_work += (work0 + work1) * area
-        largest = max(largest, -gap0, -gap1)
-        # Traction on edge e: -sigma n + tau t, at a point midway between the edges. Seen from a point of
-        # edge e this adds a couple, carried by opposite normal forces at the ends of that edge.
-        tau0 *= area
-        tau1 *= area
-        sigma0 *= area
-        sigma1 *= area
-        couple = 0.5 * (gap0 * tau0 + gap1 * tau1)
-        tau = tau0 + tau1
-        sigma = sigma0 + sigma1
-        # Along t and along n: at the end of edge e, at its start, at the end of edge f, at its start.
-        at = alpha0 * tau0 + alpha1 * tau1
-        an = -alpha0 * sigma0 - alpha1 * sigma1 - couple * de
-        bt = tau - at
-        bn = -sigma - an
-        ct = -beta0 * tau0 - beta1 * tau1
-        cn = beta0 * sigma0 + beta1 * sigma1 + couple * df
-        gt = -tau - ct
-        gn = sigma - cn
-        fn[e, 0] += bt * tx + bn * ty
-        fn[e, 1] += bt * ty - bn * tx
-        fn[e2, 0] += at * tx + an * ty
-        fn[e2, 1] += at * ty - an * tx
-        if f < node_end:
-            fn[f, 0] += gt * tx + gn * ty
-            fn[f, 1] += gt * ty - gn * tx
-            fn[f2, 0] += ct * tx + cn * ty
-            fn[f2, 1] += ct * ty - cn * tx
-        else:
-            row = edge[m, FAR]
-            far[row, 0] = gt * tx + gn * ty
-            far[row, 1] = gt * ty - gn * tx
-            far[row, 2] = ct * tx + cn * ty
-            far[row, 3] = ct * ty - cn * tx
-    sums[0] += friction_work
-    sums[1] = largest
-    return -1
+    w = np.zeros(lanes.WORK_SPACE)
+    w[lanes.DEEPEST] = sums[1]
+    bad = -1
+    brittle = table[joint, 4] > 0.0 or table[joint, 7] >= 0.0
+    for first in range(begin, stop, lanes.LANES):
+        last = min(first + lanes.LANES, stop)
+        _collect(w, rows, first, last, node)
+        lanes.press_batch(w, table, joint, dt)
+        bad = _hand_out(w, rows, first, last, brittle, deepest, fn, node_end, far)
+        if bad >= 0:
+            break
+    sums[0] += w[lanes.LOST]
+    sums[1] = w[lanes.DEEPEST]
+    return bad

@@ -79,6 +79,24 @@ class Masses(NamedTuple):
         return self._replace(block=block)
 
 
+class Gains(NamedTuple):
+    """What a step works out for every vertex and block, once for all steps, because divisions are dear.
+
+    vertex : (vertices,) dt / mass; block : (blocks,) what inertia leaves out of the motion of the centre
+    burdened : (blocks,) int8, 1 for those under a load (valid while stepping)
+    """
+
+    vertex: np.ndarray
+    block: np.ndarray
+    burdened: np.ndarray
+
+
+def gains(masses: Masses, dt: float) -> Gains:
+    """The gains of masses in steps of dt [s]."""
+    less = _left_out(masses.block[:, LIGHTER], masses.block[:, WHOLE])
+    return Gains(dt / masses.vertex, less, np.zeros(len(less), dtype=np.int8))
+
+
 def of_rigid(block: np.ndarray, vertex: np.ndarray, first: np.ndarray) -> Masses:
     """Shares (vertices,) of the masses (blocks,) of rigid blocks, which move by laws of their own."""
     table = np.zeros((len(block), 3))

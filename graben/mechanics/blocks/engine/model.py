@@ -292,7 +292,7 @@ class BlockModel(DrivenModel):
         """Masses by constraints and damping; local damping looks at vertices, not at blocks."""
         local = self.damping.local
         mass = self.masses.plain(local, self.scaled) if local > 0.0 else self.masses.held(self.skeleton.still[:, 0])
-        self.skeleton = self.skeleton._replace(mass=mass)
+        self.skeleton = self.skeleton._replace(mass=mass, gains=masses.gains(mass, self.dt))
 
     def add_time(self, seconds: float) -> None:
         """Time of loading that the last steps stood for beyond their own."""

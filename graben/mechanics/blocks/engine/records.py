@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from graben.mechanics.blocks.contact.forces import Rows
-from graben.mechanics.blocks.engine.masses import Masses
+from graben.mechanics.blocks.engine.masses import Gains, Masses
 
 # Slots of Motion.drive: the coefficient of global damping [1/s]; what the rising load and the prescribed speeds are
 # multiplied by, and how much that grows a step (speeds: up to 1); by how much the load falls per unit of its way.
@@ -26,7 +26,7 @@ class Skeleton(NamedTuple):
     """What does not change while stepping: zones, contact nodes, masses, constraints and loads.
 
     zones : ElasticZones, or another law of zones/; first, second, weight, follow : contact nodes
-    mass : see masses.py; still : (k, 2) vertex and axis of prescribed velocities, wall : (vertices, 2) [m/s];
+    mass, gains : see masses.py; still : (k, 2) vertex and axis of prescribed velocities, wall : (vertices, 2) [m/s];
     still_start : (parts + 1,) where those of each part begin
     steady, rising : (vertices, 2) forces [N/m]; the load is steady + drive[LOAD] * rising, the velocity of
     still vertices drive[SPEED] * wall
@@ -38,6 +38,7 @@ class Skeleton(NamedTuple):
     weight: np.ndarray
     follow: np.ndarray
     mass: Masses
+    gains: Gains
     still: np.ndarray
     still_start: np.ndarray
     wall: np.ndarray

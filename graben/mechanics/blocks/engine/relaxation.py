@@ -17,6 +17,7 @@ from graben.mechanics.blocks.engine.motion import (
     AT_PLASTIC,
     AT_RISE,
     AT_WALL,
+    list_burdened,
     move_blocks,
 )
 from graben.mechanics.blocks.engine.records import (
@@ -39,6 +40,7 @@ from graben.mechanics.blocks.engine.records import (
 )
 from graben.mechanics.blocks.engine.threads import all_there, arrive
 from graben.mechanics.compiled import kernel
+from graben.mechanics.unsigned import span
 
 DONE, REBUILD, RUNAWAY, DEEP_OVERLAP, LEFT_ALONE = 0, 1, 2, 3, 4
 
@@ -47,10 +49,10 @@ DONE, REBUILD, RUNAWAY, DEEP_OVERLAP, LEFT_ALONE = 0, 1, 2, 3, 4
 def _press(p, m, parts, joints, deepest, dt, sums):
     """Contact forces of the pairs of part p."""
     fn, far = m.fn, m.far
-    for i in range(parts.node[p], parts.node[p + 1]):
+    for i in span(parts.node[p], parts.node[p + 1]):
         fn[i, 0] = 0.0
         fn[i, 1] = 0.0
-    for r in range(m.far_start[p], m.far_start[p + 1]):
+    for r in span(m.far_start[p], m.far_start[p + 1]):
         for d in range(4):
             far[r, d] = 0.0
     own = sums[p]
@@ -89,7 +91,7 @@ def _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums):
         fn[j, 0] += far[r, 2]
         fn[j, 1] += far[r, 3]
     joint_force = m.joint_force
-    for i in range(parts.vertex[p], parts.vertex[p + 1]):
+    for i in span(parts.vertex[p], parts.vertex[p + 1]):
         for d in range(2):
             joint_force[i, d] = 0.0
     begin = parts.node[p]
@@ -101,7 +103,9 @@ def _yield_to(p, s, m, parts, load, alpha, local, dt, speed, sums):
 
 @kernel(error_model="numpy")
 def begin(s, m, pairs):
-    """Before `advance`: node table and rows of the present state; a look is due if somebody moved nodes since."""
+    """Before `advance`: node table, rows and loaded blocks of the present state; a look is due if somebody moved
+    nodes since."""
+    list_burdened(s)
     x, v, node = m.x, m.v, m.node
     first, second, weight = s.first, s.second, s.weight
     for i in range(node.shape[0]):
@@ -197,7 +201,7 @@ def _next_drive(m):
     return load, speed, alpha
 
 
-@kernel(error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True, pairing=True)
 def advance(me, board, plan, sums, m, steps, s, parts, pairs, joints, rules):
     """Up to `steps` steps on the parts of thread `me`. Returns (status, steps done, pair concerned).
 

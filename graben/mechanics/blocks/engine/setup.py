@@ -73,7 +73,7 @@ def zones_and_masses(
     stiffest = max(max(j.stiffest, j.shear_stiffness) for j in joints)
     if rock.rigid:
         return _rigid(bodies, rock.density, area, true_mass, stiffest, dt)
-    elastic = ElasticZones(bodies.zone_vertex.astype(np.int32), gradient, area, lam, mu)
+    elastic = ElasticZones(bodies.zone_vertex.astype(np.uint32), gradient, area, lam, mu)
     law: ElasticZones | PlasticZones = elastic
     if rock.strength is not None:
         law = plastic_zones(elastic, rock.young, rock.poisson, rock.strength)
@@ -120,11 +120,12 @@ def unloaded(skin: Skin, parts: Parts, made: Made, weight: np.ndarray) -> Skelet
     """Skeleton that nothing holds and nothing but its weight (vertices, 2) [N/m] loads."""
     return Skeleton(
         made.zones,
-        skin.first.astype(np.int32),
-        skin.second.astype(np.int32),
+        skin.first.astype(np.uint32),
+        skin.second.astype(np.uint32),
         skin.weight,
-        skin.follow.astype(np.int32),
+        skin.follow.astype(np.uint32),
         made.mass,
+        masses.gains(made.mass, made.dt),
         np.empty((0, 2), dtype=np.int64),
         np.zeros(len(parts.node), dtype=np.int64),
         np.zeros(weight.shape),

@@ -55,7 +55,7 @@ def bring_back(model: BlockModel, state: dict[str, np.ndarray]) -> None:
         for name, value in found._asdict().items():
             before = getattr(own, name)
             # What depends on geometry and contacts alone is known already; compiled loops take it on trust.
-            known = isinstance(value, np.ndarray) and value.dtype.kind == "i" and name not in _CHANGING
+            known = isinstance(value, np.ndarray) and value.dtype.kind in "iu" and name not in _CHANGING
             if isinstance(value, np.ndarray) and (
                 value.shape != before.shape or (known and not np.array_equal(value, before))
             ):

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from graben.errors import Refused
-from graben.mechanics.cache_lines import ask_for
 from graben.mechanics.compiled import kernel
+from graben.mechanics.unsigned import span
 
 
 class ElasticZones(NamedTuple):
@@ -61,9 +61,7 @@ def row_sums(stiffness: np.ndarray) -> np.ndarray:
 @kernel(error_model="numpy")
 def zone_forces(x, triangles, gradient, area, lam, mu, force, begin, end):
     """Add the forces of the zones, rows begin to end, on their vertices to `force` (vertices, 2) [N/m]."""
-    last = end - 1
-    for z in range(begin, end):
-        ask_for(gradient, min(z + 6, last))
+    for z in span(begin, end):
         a = triangles[z, 0]
         b = triangles[z, 1]
         c = triangles[z, 2]

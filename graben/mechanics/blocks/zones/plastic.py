@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from graben.mechanics.blocks.zones.elastic import ElasticZones
-from graben.mechanics.cache_lines import ask_for
 from graben.mechanics.compiled import kernel
 from graben.mechanics.materials.laws import pack
 from graben.mechanics.materials.mohr_coulomb import update_mohr_coulomb
+from graben.mechanics.unsigned import span
 
 # What a zone does: elastic so far; yields now, by shear or by tension; yielded before; its law found no stress.
 ELASTIC, SHEAR, TENSION, PAST, LOST = 0, 1, 2, 3, 4
@@ -114,9 +114,7 @@ def plastic_zone_forces(x, zones, force, begin, end):
     up, down = 1.0 + sine, 1.0 - sine
     stress, rest, none = np.empty(4), np.zeros(4), np.empty((0, 0))
     work = 0.0
-    last = end - 1
-    for z in range(begin, end):
-        ask_for(gradient, min(z + 6, last))
+    for z in span(begin, end):
         a = triangles[z, 0]
         b = triangles[z, 1]
         c = triangles[z, 2]

@@ -257,3 +257,23 @@ def test_a_block_that_dead_loads_drive_off_is_stopped_and_others_run_away(guided
     again.skeleton.steady[off, 0] = 1e5
     with pytest.raises(NumericsFailed, match="speed"):
         again.advance(40_000)
+
+
+def test_loads_of_every_kind_are_seen_when_they_come():
+    # A step passes over blocks without loads; each of these pushes its block all the same.
+    shapes = [rectangle(2 * k, 0, 2 * k + 1, 1) for k in range(3)]
+    bodies = build_bodies(from_polygons(shapes, rectangle(0, 0, 5, 1)))
+    joint = Joint(1e9, 1e9, 0.6, 0.0, 0.0, 0.0, np.inf)
+    model = BlockModel(
+        bodies, young=1e9, poisson=0.2, density=2500.0, joint=joint, rounding=0.05, damping=Damping(ratio=-1.0)
+    )
+    model.advance(5)
+    assert not model.motion.v.any()
+    model.skeleton.steady[bodies.vertex_block == 0, 0] = 1e3
+    model.skeleton.rising[bodies.vertex_block == 2, 1] = 1e3
+    model.set_load(1.0)
+    model.advance(5)
+    for block, pushed in enumerate(([True, False], [False, False], [False, True])):
+        there = bodies.vertex_block == block
+        mean = np.average(model.motion.v[there], axis=0, weights=model.true_mass[there])
+        assert (np.abs(mean) > 1e-6).tolist() == pushed
