@@ -79,6 +79,6 @@ lint: $(READY) ## ruff (lint and format) and mypy
 	$(BIN)/mypy
 
 .PHONY: clean
-clean: ## remove results, caches and compiled kernels (keeps .venv)
+clean: ## remove results and caches (keeps .venv; compiled kernels: graben warm --forget)
 	rm -rf $(RESULTS) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find graben tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
