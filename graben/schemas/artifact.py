@@ -12,6 +12,7 @@ import numpy as np
 from graben.errors import BadInput, Fault, NotFinite
 from graben.schemas.artifact_marks import DIGEST, attribute_faults, content_digest, seal, seal_broken
 from graben.schemas.files import unfit, whole_file
+from graben.schemas.netcdf import Column, dims_of, write_netcdf
 from graben.schemas.provenance import Record
 
 if TYPE_CHECKING:
@@ -90,9 +91,7 @@ def write_artifact(
     MachineFailed : no room, no permission
     ValueError : the arrays do not fit the layout (a fault of the program, not of its user)
     """
-    import xarray
-
-    variables = {}
+    columns = {}
     for name, values in arrays.items():
         declared = layout.variables.get(name)
         if declared is None:
@@ -107,40 +106,25 @@ def write_artifact(
         if not partial:
             _refuse_non_finite(layout.kind, name, declared, array)
         about = {"units": declared.units, "long_name": declared.long_name, **declared.attributes}
-        variables[name] = (declared.dims, array, about)
+        fill = np.nan if array.dtype.kind == "f" and (declared.may_be_nan or partial) else None
+        columns[name] = Column(declared.dims, array, about, fill)
     missing = [n for n, v in layout.variables.items() if not v.optional and n not in arrays]
     if missing:
         raise ValueError(f"{layout.kind}: missing variables {missing}")
-    dataset = xarray.Dataset(
-        variables,
-        attrs={
-            "Conventions": "CF-1.11 UGRID-1.0",
-            "title": layout.title,
-            "schema_kind": layout.kind,
-            "schema_version": layout.version,
-            **layout.attributes,
-            **record.attributes(),
-            **(attributes or {}),
-            **({PARTIAL: partial} if partial else {}),
-        },
-    )
-    dataset.attrs[DIGEST] = content_digest(dataset)
-    # Bit-reproducible data: no time stamps, fixed compression.
-    small = {"fletcher32": True}
-    encoding: dict[Any, dict[str, Any]] = {
-        n: {**small, "zlib": True, "complevel": 1, "shuffle": True} if v.size > 4096 else dict(small)
-        for n, v in dataset.variables.items()
-        if v.ndim and v.size and v.dtype.kind in "fiu"
+    dims_of(columns)
+    marks = {
+        "Conventions": "CF-1.11 UGRID-1.0",
+        "title": layout.title,
+        "schema_kind": layout.kind,
+        "schema_version": layout.version,
+        **layout.attributes,
+        **record.attributes(),
+        **(attributes or {}),
+        **({PARTIAL: partial} if partial else {}),
     }
-    for name, declared in layout.variables.items():
-        if name in dataset.variables and dataset[name].dtype.kind == "f":
-            encoding.setdefault(name, {})["_FillValue"] = np.nan if declared.may_be_nan or partial else None
+    marks[DIGEST] = content_digest(marks, {name: column.values for name, column in columns.items()})
     with whole_file(path, ends_run=not partial) as temporary:
-        try:
-            # Of a relative path a leading ~ would become the home folder.
-            dataset.to_netcdf(temporary.absolute(), engine="netcdf4", format="NETCDF4", encoding=encoding)
-        except RuntimeError as error:
-            raise OSError(f"{error}") from error  # what the library makes of a full disk
+        write_netcdf(temporary, columns, marks)
         seal(temporary)
 
 
@@ -236,7 +220,7 @@ def _faults(file: str, size: int, dataset: xarray.Dataset, accepted: list[str], 
     faults = [Fault(file, *found) for found in attribute_faults(dataset.attrs, declared.own_attributes)]
     faults += _variable_faults(file, declared, dataset, partial and PARTIAL in dataset.attrs)
     stored = dataset.attrs.get(DIGEST)
-    if not faults and stored is not None and stored != content_digest(dataset):
+    if not faults and stored is not None and stored != content_digest(dataset.attrs, dataset.variables):
         faults.append(Fault(file, DIGEST, str(stored)[:12], "the digest of what the file holds; it is damaged"))
     return faults
 
