@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ import numpy as np
 from graben.errors import BadInput, Fault, NotFinite
 from graben.schemas.artifact_marks import DIGEST, attribute_faults, content_digest, seal, seal_broken
 from graben.schemas.files import unfit, whole_file
-from graben.schemas.netcdf import Column, dims_of, write_netcdf
+from graben.schemas.netcdf import Arrays, Column, dims_of, open_arrays, write_netcdf
 from graben.schemas.provenance import Record
 
 if TYPE_CHECKING:
@@ -151,7 +151,16 @@ def read_artifact(path: str | Path, kind: str | Iterable[str], *, partial: bool 
     ------
     BadInput : not a file, not NetCDF, foreign, of another kind, newer than this software, or with faults
     """
-    faults, dataset = _read(Path(path), [kind] if isinstance(kind, str) else list(kind), partial)
+    return _whole(path, kind, partial, _labelled)
+
+
+def read_arrays(path: str | Path, kind: str | Iterable[str]) -> Arrays | xarray.Dataset:
+    """As `read_artifact`, for stages: arrays without the labels of xarray, which takes long to import."""
+    return _whole(path, kind, False, open_artifact)
+
+
+def _whole(path: str | Path, kind: str | Iterable[str], partial: bool, opened: Callable[[Path], Any]) -> Any:
+    faults, dataset = _read(Path(path), [kind] if isinstance(kind, str) else list(kind), partial, opened)
     if dataset is None:
         raise BadInput(faults)
     return dataset
@@ -164,11 +173,16 @@ def check_artifact(path: str | Path, kinds: Iterable[str] | None = None) -> list
     """
     from graben.schemas.kinds import LAYOUTS
 
-    return _read(Path(path), list(kinds) if kinds is not None else list(LAYOUTS), True)[0]
+    return _read(Path(path), list(kinds) if kinds is not None else list(LAYOUTS), True, open_artifact)[0]
 
 
-def open_artifact(path: Path) -> xarray.Dataset:
-    """Open without a check. The path is made absolute: libraries take a leading ~ for the home folder."""
+def open_artifact(path: Path) -> Arrays | xarray.Dataset:
+    """Open without a check; the full reader is for files of other programs."""
+    return open_arrays(path) or _labelled(path)
+
+
+def _labelled(path: Path) -> xarray.Dataset:
+    """The path is made absolute: libraries take a leading ~ for the home folder."""
     import xarray
 
     return xarray.open_dataset(path.absolute(), engine="netcdf4", decode_times=False)
@@ -185,7 +199,9 @@ def kind_of(path: Path) -> str:
         return ""
 
 
-def _read(path: Path, accepted: list[str], partial: bool) -> tuple[list[Fault], xarray.Dataset | None]:
+def _read(
+    path: Path, accepted: list[str], partial: bool, opened: Callable[[Path], Any]
+) -> tuple[list[Fault], Any | None]:
     """Every fault, or none and the data."""
     file = str(path)
     if not path.is_file():
@@ -195,14 +211,16 @@ def _read(path: Path, accepted: list[str], partial: bool) -> tuple[list[Fault], 
     try:
         if seal_broken(path):
             return [Fault(file, "", "", "the bytes that were written; they are damaged")], None
-        with open_artifact(path) as dataset:
+        with opened(path) as dataset:
             faults = _faults(file, path.stat().st_size, dataset, accepted, partial)
             return faults, None if faults else dataset.load()
     except Exception as error:  # whatever damaged bytes make of HDF5, netCDF and xarray
         return [Fault(file, "", "", f"a whole NetCDF-4 file ({error})")], None
 
 
-def _faults(file: str, size: int, dataset: xarray.Dataset, accepted: list[str], partial: bool) -> list[Fault]:
+def _faults(
+    file: str, size: int, dataset: Arrays | xarray.Dataset, accepted: list[str], partial: bool
+) -> list[Fault]:
     from graben.schemas.kinds import LAYOUTS, layout
 
     kind = str(dataset.attrs.get("schema_kind", "(absent: not an artifact of graben)"))
@@ -225,7 +243,7 @@ def _faults(file: str, size: int, dataset: xarray.Dataset, accepted: list[str], 
     return faults
 
 
-def _variable_faults(file: str, declared: Layout, dataset: xarray.Dataset, partial: bool) -> list[Fault]:
+def _variable_faults(file: str, declared: Layout, dataset: Arrays | xarray.Dataset, partial: bool) -> list[Fault]:
     faults = [Fault(file, dim, "0", f"at least one: {declared.dims[dim]}") for dim in declared.filled
               if dataset.sizes.get(dim) == 0]  # fmt: skip
     for name, variable in declared.variables.items():

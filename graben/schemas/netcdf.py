@@ -1,8 +1,9 @@
-"""NetCDF-4 files, written by netCDF4 itself: xarray, which reads them, takes longer to import than a small run."""
+"""NetCDF-4 files by netCDF4 itself: xarray, which gives them to users, takes longer to import than a small run."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -10,7 +11,7 @@ import numpy as np
 
 
 class Column(NamedTuple):
-    """A variable of a file: dims, numbers or text, attributes, and the value that marks none (None: there is none)."""
+    """A variable of a file: dims, numbers or text, attributes, and the number that marks none, if any."""
 
     dims: tuple[str, ...]
     values: np.ndarray
@@ -66,3 +67,78 @@ def _write(file: Any, name: str, column: Column) -> None:
     if values.size:
         variable.set_auto_maskandscale(False)
         variable[...] = values
+
+
+class Read:
+    """A variable of an open file; its values are read when they are asked for, once."""
+
+    def __init__(self, variable: Any) -> None:
+        self._variable = variable
+        self.dims: tuple[str, ...] = tuple(variable.dimensions)
+        self.attrs: dict[str, Any] = {n: variable.getncattr(n) for n in variable.ncattrs() if n != "_FillValue"}
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        found = np.asarray(self._variable[...])
+        return found if found.dtype.kind != "U" else found.astype(object)
+
+    @property
+    def nbytes(self) -> int:
+        size = 8 if self._variable.dtype is str else np.dtype(self._variable.dtype).itemsize
+        return int(np.prod(self._variable.shape, dtype=np.float64)) * size
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.array(self.values, dtype=dtype, copy=copy)
+
+    def __float__(self) -> float:
+        return float(self.values)
+
+
+class Arrays:
+    """An open file with the few things of an xarray.Dataset that stages ask for."""
+
+    def __init__(self, file: Any) -> None:
+        self._file = file
+        self.attrs: dict[str, Any] = {name: file.getncattr(name) for name in file.ncattrs()}
+        self.sizes = {name: len(dim) for name, dim in file.dimensions.items()}
+        self.variables = {name: Read(variable) for name, variable in file.variables.items()}
+
+    @property
+    def nbytes(self) -> int:
+        return sum(variable.nbytes for variable in self.variables.values())
+
+    def __getitem__(self, name: str) -> Read:
+        return self.variables[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.variables
+
+    def load(self) -> Arrays:
+        """Read what was not read yet; the file may then be closed."""
+        for variable in self.variables.values():
+            _ = variable.values
+        return self
+
+    def __enter__(self) -> Arrays:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._file.close()
+
+
+_DECODED = {"scale_factor", "add_offset", "missing_value", "_Unsigned"}
+
+
+def open_arrays(path: Path) -> Arrays | None:
+    """Open a file; None where its numbers mean others (scaled, marked as missing) and a full reader is needed."""
+    import netCDF4
+
+    file = netCDF4.Dataset(path.absolute())
+    file.set_auto_maskandscale(False)
+    for variable in file.variables.values():
+        marks = set(variable.ncattrs())
+        filled = "_FillValue" in marks and not np.all(np.isnan(variable.getncattr("_FillValue")))
+        if marks & _DECODED or filled or (variable.dtype is not str and np.dtype(variable.dtype).kind not in "fiu"):
+            file.close()
+            return None
+    return Arrays(file)

@@ -44,7 +44,7 @@ def test_fields_of_any_size_and_type_come_back_as_they_were(rows, tmp_path):
 
 
 def test_a_field_of_another_length_is_refused(tmp_path):
-    with pytest.raises(ValueError, match="'t'.* has 2 rows, expected 1"):
+    with pytest.raises(ValueError, match="has 2 rows, expected 1"):
         write_vtu(tmp_path / "a.vtu", SQUARE, {"quad": np.array([[0, 1, 2, 3]])}, {}, {"t": np.zeros(2)})
     assert not (tmp_path / "a.vtu").exists()
 
