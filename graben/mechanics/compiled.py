@@ -42,21 +42,25 @@ def kernel(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 def _spare_wrappers(dispatcher: Any, function: Callable[..., Any], options: dict[str, Any]) -> None:
     """Other kernels call a twin without what Python would need to call it: a fifth of the time of compilation."""
-    bare = {"no_cpython_wrapper": True, **options}
-    twin = numba.njit(no_cfunc_wrapper=True, **bare)(function)
-    twin._cache = _cache_of(function, bare)
     own_template, own_overload = dispatcher.get_call_template, dispatcher.get_overload
+
+    @cache
+    def twin() -> Any:
+        bare = {"no_cpython_wrapper": True, **options}
+        made = numba.njit(no_cfunc_wrapper=True, **bare)(function)
+        made._cache = _cache_of(function, bare)
+        return made
 
     def known(arguments: Iterable[Any]) -> bool:
         return tuple(arguments) in dispatcher.overloads
 
     def get_call_template(args: Any, kws: Any) -> Any:
         folded = dispatcher._compiler.fold_argument_types(args, kws)[1]
-        return own_template(args, kws) if known(folded) else twin.get_call_template(args, kws)
+        return own_template(args, kws) if known(folded) else twin().get_call_template(args, kws)
 
     def get_overload(signature: Any) -> Any:
         arguments = sigutils.normalize_signature(signature)[0]
-        return own_overload(signature) if known(arguments) else twin.get_overload(signature)
+        return own_overload(signature) if known(arguments) else twin().get_overload(signature)
 
     dispatcher.get_call_template, dispatcher.get_overload = get_call_template, get_overload
 
