@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -108,8 +108,8 @@ def _three(vectors: np.ndarray) -> np.ndarray:
 class VtuSeries:
     """The states of a series that is being written; see `vtu_series`."""
 
-    def __init__(self, building: Path) -> None:
-        self._building = building
+    def __init__(self, building: Path, fields: Collection[str] | None) -> None:
+        self._building, self._fields = building, fields
         self.times: list[float] = []
 
     def add(
@@ -121,14 +121,19 @@ class VtuSeries:
         cell_data: Mapping[str, np.ndarray] | None = None,
     ) -> None:
         """Write the next state; see `vtu_bytes`."""
-        text = vtu_bytes(points, cells, point_data, cell_data)
+        text = vtu_bytes(points, cells, self._asked(point_data), self._asked(cell_data))
         (self._building / f"{len(self.times):04d}.vtu").write_bytes(text)
         self.times.append(float(time))
 
+    def _asked(self, data: Mapping[str, np.ndarray] | None) -> dict[str, np.ndarray]:
+        return {n: values for n, values in (data or {}).items() if self._fields is None or n in self._fields}
+
 
 @contextmanager
-def vtu_series(artifact: str | Path, tag: str = "") -> Iterator[VtuSeries]:
-    """VTU files in the folder ``NAME.vtu/`` beside the artifact, and a ``NAME.pvd``; tag : put behind NAME.
+def vtu_series(artifact: str | Path, tag: str = "", fields: Collection[str] | None = None) -> Iterator[VtuSeries]:
+    """VTU files in the folder ``NAME.vtu/`` beside the artifact, and a ``NAME.pvd``.
+
+    tag : put behind NAME; fields : those that are written of what is added, None: all
 
     >>> with vtu_series("results/run.nc") as series:          # doctest: +SKIP
     ...     series.add(0.0, points, {"triangle": triangles})
@@ -140,7 +145,7 @@ def vtu_series(artifact: str | Path, tag: str = "") -> Iterator[VtuSeries]:
     with together():
         with whole_file(folder) as building:
             building.mkdir()
-            series = VtuSeries(building)
+            series = VtuSeries(building, fields)
             yield series
         rows = "".join(
             f'    <DataSet timestep="{t!r}" part="0" file={quoteattr(f"{folder.name}/{i:04d}.vtu")}/>\n'
