@@ -40,15 +40,19 @@ def _blocks(**keys: Any) -> Callable[[Path], Any]:
     return run
 
 
-def _particles(folder: Path) -> None:
-    from graben.stages.dem_run.stage import run
+def _particles(sides: str = "periodic", friction: float = 0.0) -> Callable[[Path], Any]:
+    def run(folder: Path) -> None:
+        from graben.stages.dem_run.stage import run as dem_run
 
-    grains = [{"name": "grains", "diameter": "100 um", "share": 1.0, "density": "2200 kg/m^3"}]
-    scene = {
-        "kind": "particles", "fidelity": "draft", "grains": grains, "output": {"vtk": False},
-        "box": {"width": "0.4 mm", "depth": "0.15 mm"},
-    }  # fmt: skip
-    run(scene, folder / "bed.nc")
+        grains = [{"name": "grains", "diameter": "100 um", "share": 1.0, "density": "2200 kg/m^3"}]
+        scene = {
+            "kind": "particles", "fidelity": "draft", "grains": grains, "output": {"vtk": False},
+            "box": {"width": "0.4 mm", "depth": "0.15 mm", "sides": sides},
+            "contact": {"friction": friction, "wall_friction": friction},
+        }  # fmt: skip
+        dem_run(scene, folder / "bed.nc")
+
+    return run
 
 
 def _fem(folder: Path) -> None:
@@ -101,7 +105,10 @@ TASKS: Mapping[str, Task] = {
     "fem": Task(_fem, "laws, and fem-run"),
     "blocks-yielding": Task(_blocks(**{"rock.zones": "mohr-coulomb"}), "dem-run, blocks whose zones yield", "blocks"),
     "blocks-rigid": Task(_blocks(**{"rock.zones": "rigid"}), "dem-run, rigid blocks", "blocks"),
-    "particles": Task(_particles, "dem-run, grains"),
+    "particles": Task(_particles(), "dem-run, smooth grains between sides that repeat"),
+    "particles-rubbing": Task(_particles("periodic", 0.5), "dem-run, grains with friction", "particles"),
+    "particles-walls": Task(_particles("walls"), "dem-run, smooth grains between walls", "particles"),
+    "particles-rubbing-walls": Task(_particles("walls", 0.5), "dem-run, friction and walls", "particles-rubbing"),
     "points": Task(_points, "laws at a point", "fem"),
     "calibrate": Task(_calibrate, "calibrate, and the fits of rev-study", "points"),
     "scratch": Task(_scratch(1), "scratch", "fem"),
