@@ -72,6 +72,10 @@ bench: $(READY) ## the benchmarks; JSON lines in results/bench/
 	@for script in benchmarks/*.py; do echo "$$script"; \
 	  $(BIN)/python $$script | tee -a $(RESULTS)/bench/$$(basename $$script .py).jsonl || exit 1; done
 
+.PHONY: features
+features: $(READY) ## what each optional feature costs in time and memory, on and off: a table
+	@$(BIN)/python benchmarks/features.py --table
+
 .PHONY: lint
 lint: $(READY) ## ruff (lint and format) and mypy
 	$(BIN)/ruff check .
