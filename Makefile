@@ -88,6 +88,10 @@ bench: $(READY) ## the benchmarks; JSON lines in results/bench/
 	@for script in benchmarks/*.py; do echo "$$script"; \
 	  $(BIN)/python $$script | tee -a $(RESULTS)/bench/$$(basename $$script .py).jsonl || exit 1; done
 
+.PHONY: features
+features: $(READY) ## what each optional feature costs in time and memory, on and off: a table
+	@$(BIN)/python benchmarks/features.py --table
+
 .PHONY: lint
 lint: $(READY) ## ruff (lint and format) and mypy
 	$(BIN)/ruff check .
@@ -95,6 +99,6 @@ lint: $(READY) ## ruff (lint and format) and mypy
 	$(BIN)/mypy
 
 .PHONY: clean
-clean: ## remove results, caches and compiled kernels (keeps .venv)
+clean: ## remove results and caches (keeps .venv; compiled kernels: graben warm --forget)
 	rm -rf $(RESULTS) build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis
 	find graben tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +

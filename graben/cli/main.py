@@ -22,6 +22,7 @@ TOOLS = {
     "check": ("graben.cli.check:main", "Report every fault of scenes and artifacts."),
     "scene": ("graben.cli.scene:main", "Print a commented scene template, or its JSON Schema."),
     "show": ("graben.cli.show:main", "Draw an artifact as a picture."),
+    "warm": ("graben.cli.warm:main", "Compile every kernel once, so that no run has to."),
     "report": ("graben.cli.report:main", "One HTML page for a folder of results."),
 }
 

@@ -1,5 +1,8 @@
 """Compiled kernels on disk: one file for each kernel and signature, in a folder that nobody else can write.
 
+They lie in the user's cache folder: installations share them whose sources, Python, numba, llvmlite, numpy and CPU
+agree. All these are in the key of a kernel, and no path is.
+
 What cannot be read (torn, damaged, not the user's own) is compiled anew and written again. Files appear whole, under
 names that follow from their contents' key, so processes may write side by side.
 """
@@ -26,8 +29,14 @@ from numba.core.caching import _Cache
 from numba.core.serialize import dumps
 
 _log = logging.getLogger(__name__)
-_VERSIONS = f"{sys.implementation.cache_tag} {numba.__version__} {llvmlite.__version__} {np.__version__}"
+_PYTHON = f"{sys.implementation.cache_tag}{getattr(sys, 'abiflags', '')}"
+_VERSIONS = f"{_PYTHON} {numba.__version__} {llvmlite.__version__} {np.__version__}"
+# Settings of numba, of variables of the environment, that change the code that it makes.
+_SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "USING_SVML")
 _DIGEST = hashlib.sha256().digest_size
+
+used: dict[str, bool] = {}
+"""Kernels of this process by the name of their file: True where they were compiled here, not read."""
 
 
 class KernelCache(_Cache):
@@ -62,7 +71,11 @@ class KernelCache(_Cache):
         try:
             stored = _read(place)
             found, payload = pickle.loads(stored)
-            return compiler.CompileResult._rebuild(target_context, *payload) if found == key else None
+            if found != key:
+                return None
+            result = compiler.CompileResult._rebuild(target_context, *payload)
+            used.setdefault(place.name, False)
+            return result
         except FileNotFoundError:
             return None
         except Exception as error:  # whatever a damaged file can raise: it is written anew
@@ -77,6 +90,7 @@ class KernelCache(_Cache):
             or any(not lifted.can_cache for lifted in result.lifted)
         ):
             return
+        used[place.name] = True
         content = dumps((key, result._reduce()))
         beside = place.with_name(f"{place.name}.{uuid.uuid4().hex[:12]}.part")
         try:
@@ -94,7 +108,8 @@ class KernelCache(_Cache):
         where = folder()
         if where is None or not self._on:
             return None, ""
-        key = f"{self._key} {signature!r} {codegen.magic_tuple()}"
+        settings = [getattr(numba.config, name, None) for name in _SETTINGS]
+        key = f"{self._key} {signature!r} {codegen.magic_tuple()} {settings}"
         return where / f"{self._name}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.nbc", key
 
 
@@ -111,12 +126,12 @@ def _read(path: Path) -> bytes:
 
 @cache
 def folder() -> Path | None:
-    """Where compiled kernels are kept: beside the sources where these are the user's own, otherwise in the user's
-    cache folder; None, said once, where neither is the user's own and closed to others."""
+    """Where compiled kernels are kept: in the user's cache folder, otherwise beside the sources where these are the
+    user's own; None, said once, where neither is the user's own and closed to others."""
     sources = Path(__file__).parent
     tried = [_user_cache()]
     if _private(sources):
-        tried.insert(0, sources / "__pycache__")
+        tried.append(sources / "__pycache__")
     for place in tried:
         if place is None:
             continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,7 @@ import numpy as np
 from graben.errors import BadInput, Fault, NotFinite
 from graben.schemas.artifact_marks import DIGEST, attribute_faults, content_digest, seal, seal_broken
 from graben.schemas.files import unfit, whole_file
+from graben.schemas.netcdf import Arrays, Column, dims_of, open_arrays, write_netcdf
 from graben.schemas.provenance import Record
 
 if TYPE_CHECKING:
@@ -90,9 +91,7 @@ def write_artifact(
     MachineFailed : no room, no permission
     ValueError : the arrays do not fit the layout (a fault of the program, not of its user)
     """
-    import xarray
-
-    variables = {}
+    columns = {}
     for name, values in arrays.items():
         declared = layout.variables.get(name)
         if declared is None:
@@ -107,40 +106,25 @@ def write_artifact(
         if not partial:
             _refuse_non_finite(layout.kind, name, declared, array)
         about = {"units": declared.units, "long_name": declared.long_name, **declared.attributes}
-        variables[name] = (declared.dims, array, about)
+        fill = np.nan if array.dtype.kind == "f" and (declared.may_be_nan or partial) else None
+        columns[name] = Column(declared.dims, array, about, fill)
     missing = [n for n, v in layout.variables.items() if not v.optional and n not in arrays]
     if missing:
         raise ValueError(f"{layout.kind}: missing variables {missing}")
-    dataset = xarray.Dataset(
-        variables,
-        attrs={
-            "Conventions": "CF-1.11 UGRID-1.0",
-            "title": layout.title,
-            "schema_kind": layout.kind,
-            "schema_version": layout.version,
-            **layout.attributes,
-            **record.attributes(),
-            **(attributes or {}),
-            **({PARTIAL: partial} if partial else {}),
-        },
-    )
-    dataset.attrs[DIGEST] = content_digest(dataset)
-    # Bit-reproducible data: no time stamps, fixed compression.
-    small = {"fletcher32": True}
-    encoding: dict[Any, dict[str, Any]] = {
-        n: {**small, "zlib": True, "complevel": 1, "shuffle": True} if v.size > 4096 else dict(small)
-        for n, v in dataset.variables.items()
-        if v.ndim and v.size and v.dtype.kind in "fiu"
+    dims_of(columns)
+    marks = {
+        "Conventions": "CF-1.11 UGRID-1.0",
+        "title": layout.title,
+        "schema_kind": layout.kind,
+        "schema_version": layout.version,
+        **layout.attributes,
+        **record.attributes(),
+        **(attributes or {}),
+        **({PARTIAL: partial} if partial else {}),
     }
-    for name, declared in layout.variables.items():
-        if name in dataset.variables and dataset[name].dtype.kind == "f":
-            encoding.setdefault(name, {})["_FillValue"] = np.nan if declared.may_be_nan or partial else None
+    marks[DIGEST] = content_digest(marks, {name: column.values for name, column in columns.items()})
     with whole_file(path, ends_run=not partial) as temporary:
-        try:
-            # Of a relative path a leading ~ would become the home folder.
-            dataset.to_netcdf(temporary.absolute(), engine="netcdf4", format="NETCDF4", encoding=encoding)
-        except RuntimeError as error:
-            raise OSError(f"{error}") from error  # what the library makes of a full disk
+        write_netcdf(temporary, columns, marks)
         seal(temporary)
 
 
@@ -167,7 +151,16 @@ def read_artifact(path: str | Path, kind: str | Iterable[str], *, partial: bool 
     ------
     BadInput : not a file, not NetCDF, foreign, of another kind, newer than this software, or with faults
     """
-    faults, dataset = _read(Path(path), [kind] if isinstance(kind, str) else list(kind), partial)
+    return _whole(path, kind, partial, _labelled)
+
+
+def read_arrays(path: str | Path, kind: str | Iterable[str]) -> Arrays | xarray.Dataset:
+    """As `read_artifact`, for stages: arrays without the labels of xarray, which takes long to import."""
+    return _whole(path, kind, False, open_artifact)
+
+
+def _whole(path: str | Path, kind: str | Iterable[str], partial: bool, opened: Callable[[Path], Any]) -> Any:
+    faults, dataset = _read(Path(path), [kind] if isinstance(kind, str) else list(kind), partial, opened)
     if dataset is None:
         raise BadInput(faults)
     return dataset
@@ -180,11 +173,16 @@ def check_artifact(path: str | Path, kinds: Iterable[str] | None = None) -> list
     """
     from graben.schemas.kinds import LAYOUTS
 
-    return _read(Path(path), list(kinds) if kinds is not None else list(LAYOUTS), True)[0]
+    return _read(Path(path), list(kinds) if kinds is not None else list(LAYOUTS), True, open_artifact)[0]
 
 
-def open_artifact(path: Path) -> xarray.Dataset:
-    """Open without a check. The path is made absolute: libraries take a leading ~ for the home folder."""
+def open_artifact(path: Path) -> Arrays | xarray.Dataset:
+    """Open without a check; the full reader is for files of other programs."""
+    return open_arrays(path) or _labelled(path)
+
+
+def _labelled(path: Path) -> xarray.Dataset:
+    """The path is made absolute: libraries take a leading ~ for the home folder."""
     import xarray
 
     return xarray.open_dataset(path.absolute(), engine="netcdf4", decode_times=False)
@@ -201,7 +199,9 @@ def kind_of(path: Path) -> str:
         return ""
 
 
-def _read(path: Path, accepted: list[str], partial: bool) -> tuple[list[Fault], xarray.Dataset | None]:
+def _read(
+    path: Path, accepted: list[str], partial: bool, opened: Callable[[Path], Any]
+) -> tuple[list[Fault], Any | None]:
     """Every fault, or none and the data."""
     file = str(path)
     if not path.is_file():
@@ -211,14 +211,16 @@ def _read(path: Path, accepted: list[str], partial: bool) -> tuple[list[Fault], 
     try:
         if seal_broken(path):
             return [Fault(file, "", "", "the bytes that were written; they are damaged")], None
-        with open_artifact(path) as dataset:
+        with opened(path) as dataset:
             faults = _faults(file, path.stat().st_size, dataset, accepted, partial)
             return faults, None if faults else dataset.load()
     except Exception as error:  # whatever damaged bytes make of HDF5, netCDF and xarray
         return [Fault(file, "", "", f"a whole NetCDF-4 file ({error})")], None
 
 
-def _faults(file: str, size: int, dataset: xarray.Dataset, accepted: list[str], partial: bool) -> list[Fault]:
+def _faults(
+    file: str, size: int, dataset: Arrays | xarray.Dataset, accepted: list[str], partial: bool
+) -> list[Fault]:
     from graben.schemas.kinds import LAYOUTS, layout
 
     kind = str(dataset.attrs.get("schema_kind", "(absent: not an artifact of graben)"))
@@ -236,12 +238,12 @@ def _faults(file: str, size: int, dataset: xarray.Dataset, accepted: list[str], 
     faults = [Fault(file, *found) for found in attribute_faults(dataset.attrs, declared.own_attributes)]
     faults += _variable_faults(file, declared, dataset, partial and PARTIAL in dataset.attrs)
     stored = dataset.attrs.get(DIGEST)
-    if not faults and stored is not None and stored != content_digest(dataset):
+    if not faults and stored is not None and stored != content_digest(dataset.attrs, dataset.variables):
         faults.append(Fault(file, DIGEST, str(stored)[:12], "the digest of what the file holds; it is damaged"))
     return faults
 
 
-def _variable_faults(file: str, declared: Layout, dataset: xarray.Dataset, partial: bool) -> list[Fault]:
+def _variable_faults(file: str, declared: Layout, dataset: Arrays | xarray.Dataset, partial: bool) -> list[Fault]:
     faults = [Fault(file, dim, "0", f"at least one: {declared.dims[dim]}") for dim in declared.filled
               if dataset.sizes.get(dim) == 0]  # fmt: skip
     for name, variable in declared.variables.items():

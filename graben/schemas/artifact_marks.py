@@ -10,12 +10,9 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-
-if TYPE_CHECKING:
-    import xarray
 
 DIGEST = "content_sha256"
 
@@ -53,14 +50,14 @@ def seal_broken(path: Path) -> bool:
     return digest.digest() != end[len(_SEAL) :]
 
 
-def content_digest(dataset: xarray.Dataset) -> str:
-    """SHA-256 of attributes and values, the same before writing and after reading."""
+def content_digest(attributes: Mapping[str, Any], variables: Mapping[Any, Any]) -> str:
+    """SHA-256 of attributes and values, the same before writing (arrays) and after reading (variables of a file)."""
     total = hashlib.sha256()
-    for name, value in sorted(dataset.attrs.items()):
+    for name, value in sorted(attributes.items()):
         if name != DIGEST:
             total.update(f"{name} {_plain(value)!r}\n".encode())
-    for name in sorted(map(str, dataset.variables)):
-        values = np.asarray(dataset[name].values)
+    for name in sorted(map(str, variables)):
+        values = np.asarray(variables[name])
         total.update(f"{name} {values.shape}\n".encode())
         if values.dtype.kind in "SUO":
             total.update("\0".join(map(str, values.ravel())).encode())

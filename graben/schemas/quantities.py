@@ -106,6 +106,24 @@ _UNITS = {
 KNOWN = tuple(_UNITS)
 """SI units that scenes know."""
 
+# The units of most scenes, with the factors that pint gives, which takes longer to import than a scene to read.
+_USUAL: dict[str, dict[str, float]] = {
+    "m": {"m": 1.0, "cm": 0.01, "mm": 0.001, "um": 1e-06, "km": 1000.0},
+    "m^2": {"m^2": 1.0, "cm^2": 0.0001, "mm^2": 1e-06, "um^2": 1e-12},
+    "Pa": {"Pa": 1.0, "kPa": 1000.0, "MPa": 1e6, "GPa": 1e9},
+    "Pa/m": {"Pa/m": 1.0, "MPa/m": 1e6, "GPa/m": 1e9},
+    "Pa/s": {"Pa/s": 1.0, "kPa/s": 1000.0, "MPa/s": 1e6},
+    "N": {"N": 1.0, "mN": 0.001, "kN": 1000.0},
+    "N/m": {"N/m": 1.0, "kN/m": 1000.0},
+    "kg/m^3": {"kg/m^3": 1.0},
+    "rad": {"rad": 1.0, "deg": 0.017453292519943295},
+    "rad/s": {"rad/s": 1.0, "rpm": 0.10471975511965977, "deg/s": 0.017453292519943295},
+    "m/s": {"m/s": 1.0, "mm/s": 0.001, "um/s": 1e-06},
+    "m/s^2": {"m/s^2": 1.0},
+    "s": {"s": 1.0, "ms": 0.001, "us": 1e-06},
+    "1/s": {"/s": 1.0, "1/s": 1.0, "Hz": 1.0, "kHz": 1000.0},
+}
+
 _ANGULAR = {
     "rad": "an angle names its unit, deg or rad",
     "rad/s": "an angular speed names its angle: rpm, deg/s or rad/s",
@@ -149,7 +167,9 @@ def to_si(text: Any, unit: str, *, tiny: bool = False) -> float:
     if match is None:
         raise Refused(f"{wanted}; {_cure(plain, unit)}")
     number = _finite(match[1])
-    value = number * _factor(re.sub(r"\s", "", match[2]), unit, wanted)
+    named = re.sub(r"\s", "", match[2])
+    usual = _USUAL[unit].get(named)
+    value = number * (_factor(named, unit, wanted) if usual is None else usual)
     if not abs(value) <= largest:
         raise Refused(f"{wanted}, finite and at most {largest:g} {unit}")
     if number and abs(value) < smallest and not tiny:

@@ -107,16 +107,15 @@ def test_a_signal_between_the_pictures_of_a_report_ends_it(small_blocks, tmp_pat
 
 
 def test_a_signal_while_a_library_writes_waits_for_it(tmp_path, monkeypatch):
-    import xarray
+    artifact = import_module("graben.schemas.artifact")
+    real, written = artifact.write_netcdf, []
 
-    real, written = xarray.Dataset.to_netcdf, []
-
-    def signalled(self, path, **named):
+    def signalled(path, *contents):
         kill_self()
-        real(self, path, **named)
+        real(path, *contents)
         written.append(path)
 
-    monkeypatch.setattr(xarray.Dataset, "to_netcdf", signalled)
+    monkeypatch.setattr(artifact, "write_netcdf", signalled)
     result = command("wear-estimate", PIPELINES / "wear/astm-g65-mixtures.toml", "-o", tmp_path / "out.nc")
     assert result.exit_code == 130, result.output
     assert len(written) == 1

@@ -160,7 +160,7 @@ def test_averages_their_picture_and_their_outlines_appear_together(small_blocks,
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("xarray.Dataset.to_netcdf", full)
+        patch.setattr("graben.schemas.artifact.write_netcdf", full)
         result = command(*call, "--steps", tmp_path / "steps.png")
     assert result.exit_code == 3 and "c.nc" in result.output
     assert list(tmp_path.iterdir()) == []

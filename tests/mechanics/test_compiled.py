@@ -60,6 +60,30 @@ def test_an_edit_of_a_called_law_in_another_room_reaches_its_cached_callers(hous
     assert run(house) == (7.0, False)
 
 
+def test_installations_with_the_same_sources_share_their_kernels(house, tmp_path):
+    assert run(house) == (5.0, False)
+    other = tmp_path / "elsewhere"
+    shutil.copytree(house / "graben", other / "graben")
+    (other / "cache").symlink_to(house / "cache")
+    assert run(other) == (5.0, True)
+
+
+def test_a_kernel_that_another_called_can_be_called_from_python(house):
+    assert run(house) == (5.0, False)
+    script = SCRIPT.replace("import loop;", "import law, loop;").replace("print(", "print(law(2.0) + ")
+    about = {**os.environ, "XDG_CACHE_HOME": str(house / "cache")}
+    for order in (script, script.replace("v = loop(2.0)", "law(2.0); v = loop(2.0)")):
+        ended = subprocess.run([sys.executable, "-c", order], cwd=house, env=about, capture_output=True, text=True)
+        assert ended.stdout.split()[0] == "9.0", ended.stderr
+
+
+def test_another_setting_of_numba_makes_another_kernel(folders, monkeypatch):
+    assert not called()
+    monkeypatch.setattr(numba.config, "LOOP_VECTORIZE", 0)
+    assert not called()
+    assert called()
+
+
 def test_processes_may_fill_the_cache_side_by_side(house):
     both = [start(house), start(house)]
     assert [process.communicate()[0].split()[0] for process in both] == ["5.0", "5.0"]
@@ -96,14 +120,14 @@ def called() -> bool:
 
 @pytest.fixture
 def folders(tmp_path, monkeypatch):
-    """Where kernels are kept: beside the sources, or in the user's cache folder."""
+    """Where kernels are kept: in the user's cache folder, or beside the sources."""
     sources, user = tmp_path / "sources", tmp_path / "user"
     sources.mkdir(mode=0o700)
     monkeypatch.setattr(kernel_cache, "__file__", str(sources / "kernel_cache.py"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(user))
     kernel_cache.folder.cache_clear()
     kernel_cache._say_once.cache_clear()
-    yield sources / "__pycache__" / "kernels", user / "graben" / "kernels"
+    yield user / "graben" / "kernels", sources / "__pycache__" / "kernels"
     kernel_cache.folder.cache_clear()
 
 
@@ -134,32 +158,38 @@ def test_a_file_that_others_can_write_is_not_run(folders):
     assert called()
 
 
-def test_kernels_of_a_shared_installation_are_kept_in_the_users_folder(folders):
-    folders[0].parents[1].chmod(0o777)
+def test_kernels_are_kept_in_the_users_folder_closed_to_others(folders):
     assert not called()
-    assert not folders[0].exists()
+    assert not folders[1].exists()
+    assert len(list(folders[0].iterdir())) == 1
+    assert folders[0].stat().st_mode & 0o777 == 0o700
+    assert called()
+
+
+def test_without_a_folder_of_the_user_kernels_lie_beside_sources_of_ones_own(folders):
+    folders[0].parents[1].touch()
+    assert not called()
     assert len(list(folders[1].iterdir())) == 1
-    assert folders[1].stat().st_mode & 0o777 == 0o700
     assert called()
 
 
 def test_a_folder_that_others_can_write_is_not_used(folders, caplog):
-    folders[1].mkdir(parents=True)
-    for folder in (folders[1], folders[0].parents[1]):
+    folders[0].mkdir(parents=True)
+    for folder in (folders[0], folders[1].parents[1]):
         folder.chmod(0o777)
     assert [called(), called()] == [False, False]
-    assert list(folders[1].iterdir()) == []
+    assert list(folders[0].iterdir()) == []
     assert sum("not kept" in record.message for record in caplog.records) == 1
 
 
 def test_the_folder_of_another_user_is_not_used(folders, monkeypatch):
-    monkeypatch.setattr(os, "geteuid", lambda: folders[0].parents[1].stat().st_uid + 1)
+    monkeypatch.setattr(os, "geteuid", lambda: folders[1].parents[1].stat().st_uid + 1)
     assert kernel_cache.folder() is None
 
 
 def test_without_a_folder_kernels_run_and_it_is_said_once(folders, caplog):
-    folders[0].parent.touch()
-    folders[1].parents[1].touch()
+    folders[0].parents[1].touch()
+    folders[1].parent.touch()
     with caplog.at_level(logging.WARNING):
         assert [called(), called()] == [False, False]
     assert sum("not kept" in record.message for record in caplog.records) == 1

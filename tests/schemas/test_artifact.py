@@ -86,13 +86,11 @@ def test_a_variable_may_hold_no_number_at_all_where_its_layout_says_so(tmp_path,
 
 
 def test_an_interrupted_write_leaves_no_file(tmp_path, monkeypatch):
-    import xarray
-
-    def half(self, path, **kwargs):
+    def half(path, columns, attributes):
         path.write_bytes(b"half")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(xarray.Dataset, "to_netcdf", half)
+    monkeypatch.setattr(artifact, "write_netcdf", half)
     with pytest.raises(KeyboardInterrupt):
         write(tmp_path / "a.nc")
     assert list(tmp_path.iterdir()) == []

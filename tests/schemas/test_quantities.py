@@ -6,6 +6,7 @@ import time
 import pytest
 
 from graben.errors import Refused
+from graben.schemas import quantities
 from graben.schemas.quantities import plain_number, to_si
 
 
@@ -137,3 +138,10 @@ def test_plain_numbers_alone_are_numbers(text):
 
 def test_parameters_of_a_fit_may_be_tiny():
     assert to_si("1e-17 Pa", "Pa", tiny=True) == 1e-17
+
+
+def test_the_table_of_usual_units_has_the_factors_of_pint():
+    assert set(quantities._USUAL) == set(quantities.KNOWN)
+    for unit, factors in quantities._USUAL.items():
+        for text, factor in factors.items():
+            assert quantities._factor(text, unit, "") == factor, text

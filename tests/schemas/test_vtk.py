@@ -20,6 +20,35 @@ def test_a_vtu_opens_in_vtk_with_its_fields(tmp_path):
     assert grid.cell_data["stress"][1].tolist() == [6, 7, 8, 9, 10, 11]
 
 
+@pytest.mark.parametrize("rows", [1, 3, (1 << 20) // 8, (1 << 20) // 8 + 1, 400_000])
+def test_fields_of_any_size_and_type_come_back_as_they_were(rows, tmp_path):
+    import pyvista
+
+    rng = np.random.default_rng(rows)
+    fields = {
+        "double": rng.normal(size=rows),
+        '<vector> & "name"': rng.normal(size=(rows, 3)),
+        "single": rng.normal(size=rows).astype(np.float32),
+        **{kind: rng.integers(0, 99, rows).astype(kind) for kind in ("i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8")},
+        "big-endian": rng.normal(size=rows).astype(">f8"),
+        "flag": rng.random(rows) < 0.5,
+        "nan": np.full(rows, np.nan),
+    }
+    points = rng.normal(size=(rows, 3))
+    write_vtu(tmp_path / "a.vtu", points, {"vertex": np.arange(rows)[:, None]}, fields, fields)
+    grid = pyvista.read(tmp_path / "a.vtu")
+    assert np.array_equal(grid.points, points) and grid.n_cells == rows
+    for data in (grid.point_data, grid.cell_data):
+        for name, values in fields.items():
+            assert np.array_equal(data[name], values, equal_nan=values.dtype.kind == "f"), name
+
+
+def test_a_field_of_another_length_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="has 2 rows, expected 1"):
+        write_vtu(tmp_path / "a.vtu", SQUARE, {"quad": np.array([[0, 1, 2, 3]])}, {}, {"t": np.zeros(2)})
+    assert not (tmp_path / "a.vtu").exists()
+
+
 def test_a_grid_without_cells_opens_too(tmp_path):
     import pyvista
 

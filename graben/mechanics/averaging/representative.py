@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import chdtr, stdtr
 
 from graben.errors import Refused
 
@@ -99,7 +99,7 @@ def convergence(values: Floats, criteria: Criteria, seed: int, independent: Floa
     if independent is not None and values.shape[2] >= 3:
         worth = np.minimum(worth, np.maximum(independent, 2.0))
     freedom = worth[tested] - 1.0
-    variance_p[tested] = stats.chi2.cdf(freedom * (deviation[tested] / limit) ** 2, freedom)
+    variance_p[tested] = chdtr(freedom, freedom * (deviation[tested] / limit) ** 2)
     return Convergence(
         count=count,
         mean=mean,
@@ -148,7 +148,7 @@ def _equivalence_p(here: Floats, there: Floats, margin: float) -> float:
     error = float(difference.std(ddof=1)) / np.sqrt(difference.size)
     if error == 0.0:
         return 0.0 if abs(middle) < margin else 1.0
-    return float(stats.t.sf((margin - abs(middle)) / error, difference.size - 1))
+    return float(stdtr(difference.size - 1, (abs(middle) - margin) / error))
 
 
 def bootstrap_interval(values: Floats, confidence: float, resamples: int, seed: int) -> tuple[Floats, Floats]:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 
@@ -23,6 +22,8 @@ _PASSES = 4
 
 def _filtered(columns: Array, rho: float) -> Array:
     """R columns for one group, R_ij = rho^|i - j|."""
+    from scipy.signal import lfilter  # slow to import, and used at the end of a fit only
+
     ahead = lfilter([1.0], [1.0, -rho], columns, axis=0)
     behind = lfilter([1.0], [1.0, -rho], columns[::-1], axis=0)[::-1]
     return np.asarray(ahead + behind - columns, dtype=np.float64)

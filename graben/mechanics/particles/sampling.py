@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 Floats = NDArray[np.float64]
 
@@ -15,9 +15,7 @@ def interval_over_beds(density: Floats, level: float = 0.95) -> tuple[Floats, Fl
     if density.ndim != 2 or density.shape[0] < 2:
         raise ValueError(f"density: expected shape (beds >= 2, classes), found {density.shape}")
     mean = density.mean(axis=0)
-    half = (
-        student.ppf(0.5 + level / 2.0, density.shape[0] - 1) * density.std(axis=0, ddof=1) / np.sqrt(density.shape[0])
-    )
+    half = stdtrit(density.shape[0] - 1, 0.5 + level / 2.0) * density.std(axis=0, ddof=1) / np.sqrt(density.shape[0])
     return mean, np.maximum(mean - half, 0.0), mean + half
 
 

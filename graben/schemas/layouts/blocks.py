@@ -47,7 +47,7 @@ LAYOUT = Layout(
         "block_corner_count": Variable(_B, "1", "corners of the block", dtype="i4", sum_of="corner"),
         "block_corner": Variable(("corner",), "1", "vertex of the corner", dtype="i4", index_of="vertex"),
         "displacement": Variable(("time", "vertex", "axis"), "m", "displacement since the first state"),
-        "velocity": Variable(("time", "vertex", "axis"), "m s-1", "velocity"),
+        "velocity": Variable(("time", "vertex", "axis"), "m s-1", "velocity", optional=True),
         "zone_stress": Variable(("time", "zone", "component"), "Pa", "Cauchy stress, tension positive"),
         "block_stress": Variable(
             ("time", "block", "plane"),
@@ -101,11 +101,13 @@ LAYOUT = Layout(
         "contact_set": Variable(
             _C, "1", "set of joints of the contact; 0: those of [joints] itself", dtype="i2", optional=True
         ),
-        "contact_normal_stress": Variable(_C, "Pa", "mean normal stress, tension positive"),
-        "contact_shear_stress": Variable(_C, "Pa", "mean shear stress on the first block, along the tangent"),
+        "contact_normal_stress": Variable(_C, "Pa", "mean normal stress, tension positive", optional=True),
+        "contact_shear_stress": Variable(
+            _C, "Pa", "mean shear stress on the first block, along the tangent", optional=True
+        ),
         "contact_length": Variable(_C, "m", "length over which the edges face each other"),
         "contact_slip": Variable(_C, "m", "net plastic sliding, mean of both ends"),
-        "contact_opening": Variable(_C, "m", "gap, mean of both ends; negative: overlap"),
+        "contact_opening": Variable(_C, "m", "gap, mean of both ends; negative: overlap", optional=True),
         "contact_state": Variable(
             _C,
             "1",

@@ -9,8 +9,9 @@ _FACE = {"mesh": "mesh", "location": "face"}
 
 
 def _field(units: str, long_name: str, tensor: bool = False) -> Variable:
+    """A field of the elements; absent where output.fields leaves it out."""
     dims = ("time", "face", "component") if tensor else ("time", "face")
-    return Variable(dims, units, long_name, attributes=_FACE)
+    return Variable(dims, units, long_name, optional=True, attributes=_FACE)
 
 
 LAYOUT = Layout(

@@ -55,9 +55,11 @@ LAYOUT = Layout(
         "particle_class": Variable(_P, "1", "index of the class", dtype="i8", index_of="class"),
         "particle_radius": Variable(_P, "m", "radius"),
         "position": Variable(("state", "particle", "axis"), "m", "centre"),
-        "velocity": Variable(("particle", "axis"), "m s-1", "velocity at the end"),
+        "velocity": Variable(("particle", "axis"), "m s-1", "velocity at the end", optional=True),
         "floor_force": Variable(_P, "N", "push on the floor at the end (0: no contact)"),
-        "coordination": Variable(_P, "1", "contacts of the sphere at the end, walls included", dtype="i8"),
+        "coordination": Variable(
+            _P, "1", "contacts of the sphere at the end, walls included", dtype="i8", optional=True
+        ),
         "contact_particle": Variable(
             ("contact", "side"), "1", "indices of the two spheres", dtype="i8", index_of="particle"
         ),

@@ -201,6 +201,12 @@ class Joints(Model):
         return self.model_copy(update=own[0]) if own else self
 
 
+BlockField = Literal[
+    "displacement", "velocity", "boundary_force", "stress", "stress_major_compressive", "stress_minor_compressive",
+    "block", "plastic_strain", "state", "slip", "opening", "normal_stress", "shear_stress", "force", "set",
+]  # fmt: skip
+
+
 class Output(Model):
     """What is written beside the artifact."""
 
@@ -210,6 +216,10 @@ class Output(Model):
         "forces to round-off",
     )
     vtk: Switch = key(True, "VTU files with a PVD for ParaView: zones and, in NAME-joints, contacts")
+    fields: list[BlockField] | None = key(
+        None,
+        "fields of VTU files; the artifact also lacks what no later stage needs; left out: all",
+    )
 
 
 class BlocksScene(Scene):

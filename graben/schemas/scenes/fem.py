@@ -157,6 +157,21 @@ class Gravity(Model):
     vertical: Acceleration = key("-9.81 m/s^2", "acceleration along y (upwards positive)")
 
 
+FemField = Literal[
+    "displacement", "gravity_displacement", "stress", "strain", "mean_stress", "von_mises_stress", "plastic_strain",
+    "damage",
+]  # fmt: skip
+
+
+class Output(Model):
+    """What is written."""
+
+    fields: list[FemField] | None = key(
+        None,
+        "fields of VTU files; the artifact also lacks what no later stage needs; left out: all",
+    )
+
+
 class Stepping(Model):
     """Load steps and their equilibrium."""
 
@@ -217,6 +232,7 @@ class FemScene(Scene):
         _SLOPE_LOADS, "a pressure on a segment of the outline (repeatable)", min_length=1, max_length=10_000
     )
     stepping: Stepping = key(Stepping(), "load steps")
+    output: Output = key(Output(), "files")
 
     @model_validator(mode="after")
     def _something_rises(self) -> Self:

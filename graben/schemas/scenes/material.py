@@ -119,10 +119,10 @@ def read_material(path: str | Path) -> tuple[str, dict[str, Any]]:
     """
     path = Path(path)
     if path.suffix == ".nc":
-        from graben.schemas.artifact import read_artifact
+        from graben.schemas.artifact import read_arrays
 
         try:
-            tables = parse_toml(str(read_artifact(path, "calibration").attrs["material"]))
+            tables = parse_toml(str(read_arrays(path, "calibration").attrs["material"]))
         except ValueError as error:
             if isinstance(error, BadInput):
                 raise

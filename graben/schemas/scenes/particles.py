@@ -104,6 +104,10 @@ class Output(Model):
     """What is written beside the artifact."""
 
     vtk: Switch = key(True, "VTU files with a PVD for ParaView, one per phase, of the first bed")
+    fields: list[Literal["radius", "class", "velocity", "coordination", "floor_force"]] | None = key(
+        None,
+        "fields of VTU files; the artifact also lacks what no later stage needs; left out: all",
+    )
 
 
 class ParticlesScene(Scene):

@@ -132,6 +132,9 @@ class Output(Model):
         61, "sections across the track, from one end of the fine range to the other", ge=3, le=2000
     )
     points: Integer = key(181, "points per section", ge=11, le=5000)
+    fields: list[Literal["displacement", "stress", "von_mises", "plastic_strain", "damage"]] | None = key(
+        None, "fields of VTU files; left out: all"
+    )
 
 
 class ScratchScene(Scene):

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import xarray
 
 from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.averaging.history import Contacts, History
 from graben.mechanics.averaging.outline import domain_outline
 from graben.mechanics.averaging.rev import Circle, Rev
-from graben.schemas.artifact import read_artifact
+from graben.schemas.artifact import read_arrays
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def read_run(path: Path) -> Run:
     ------
     BadInput : not a whole artifact of blocks, or its indices do not fit together
     """
-    data = read_artifact(path, "blocks")
+    data = read_arrays(path, "blocks")
     faults = _shape_faults(path, data)
     if faults:
         raise BadInput(faults)
@@ -124,15 +124,15 @@ def read_run(path: Path) -> Run:
     )
 
 
-def _floats(data: xarray.Dataset, name: str) -> np.ndarray:
+def _floats(data: Any, name: str) -> np.ndarray:
     return np.ascontiguousarray(data[name].values, dtype=np.float64)
 
 
-def _ints(data: xarray.Dataset, name: str) -> np.ndarray:
+def _ints(data: Any, name: str) -> np.ndarray:
     return np.ascontiguousarray(data[name].values, dtype=np.int64)
 
 
-def _shape_faults(path: Path, data: xarray.Dataset) -> list[Fault]:
+def _shape_faults(path: Path, data: Any) -> list[Fault]:
     """Dims without an entry, times that do not rise."""
     faults = []
     for name in ("time", "vertex", "block"):

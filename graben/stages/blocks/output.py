@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,14 +13,24 @@ from graben.schemas.vtk import vtu_series
 # Of zones that can yield; in the files without "zone_".
 YIELD = ("zone_plastic_strain", "zone_state")
 
+SPARE = {
+    "velocity": "velocity",
+    "zone_plastic_strain": "plastic_strain",
+    "zone_state": "state",
+    "contact_opening": "opening",
+    "contact_normal_stress": "normal_stress",
+    "contact_shear_stress": "shear_stress",
+}
+"""Variables of the artifact that no later stage needs, and the field that each of them is."""
 
-def write_vtk(output: Path, arrays: dict[str, np.ndarray]) -> None:
-    """Zones in NAME.pvd, contacts as lines in NAME-joints.pvd, one VTU a state each."""
+
+def write_vtk(output: Path, arrays: dict[str, np.ndarray], fields: Sequence[str] | None = None) -> None:
+    """Zones in NAME.pvd, contacts as lines in NAME-joints.pvd, one VTU a state each; fields : None for all."""
     reference = arrays["vertex_position"]
     rigid = "block_stress" in arrays
     triangles, owner = _triangles(arrays) if rigid else (arrays["zone_vertex"], arrays["zone_block"])
     end = np.concatenate([[0], np.cumsum(arrays["contact_count"])])
-    with vtu_series(output) as zones, vtu_series(output, "-joints") as joints:
+    with vtu_series(output, "", fields) as zones, vtu_series(output, "-joints", fields) as joints:
         for k, time in enumerate(arrays["time"]):
             removed = arrays["block_removed"][k] > 0 if "block_removed" in arrays else np.zeros(0, dtype=bool)
             there = ~removed[owner] if len(removed) else slice(None)

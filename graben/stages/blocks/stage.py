@@ -23,11 +23,12 @@ from graben.stages.blocks.biaxial import BiaxialReport, biaxial
 from graben.stages.blocks.extent import extent_of, map_of
 from graben.stages.blocks.geometry import Ground, lay_out
 from graben.stages.blocks.model import block_model
-from graben.stages.blocks.output import write_vtk
+from graben.stages.blocks.output import SPARE, write_vtk
 from graben.stages.blocks.programme import ProgrammeReport, programme
 from graben.stages.blocks.report import Report, turnover
 from graben.stages.blocks.sizes import sizes_of, steps_of
 from graben.stages.shared.estimate import Estimate, refuse_too_large
+from graben.stages.shared.fields import kept
 from graben.stages.shared.last_good import keep_by, keeps_last_good, write_whole
 from graben.stages.shared.measures import warnings_of
 from graben.stages.shared.record import Progress, Record, silent
@@ -70,12 +71,15 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
         _bring_back(blocks_checkpoint.path_for(output), model, test, history, parts)
     keeper = blocks_checkpoint.Keeper(output, scene, len(history.time))
 
+    def written(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        return kept(scene.output.fields, ground.placed(arrays), SPARE)
+
     def keep(why: str) -> Path | None:
         if not keeper.states:
             return None
         history.cut(keeper.states)
         path = beside(output, PARTIAL)
-        write_artifact(path, LAYOUT, ground.placed(_arrays(model, history, report)), record, partial=why)
+        write_artifact(path, LAYOUT, written(_arrays(model, history, report)), record, partial=why)
         return path
 
     keep_by(keep)
@@ -115,8 +119,8 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
     try:
         with together():
             if scene.output.vtk:
-                write_vtk(output, arrays)
-            write_whole(output, LAYOUT, arrays, record)
+                write_vtk(output, arrays, scene.output.fields)
+            write_whole(output, LAYOUT, kept(scene.output.fields, arrays, SPARE), record)
     except (MachineFailed, KeyboardInterrupt):
         keeper.stopped()
         raise

@@ -12,7 +12,7 @@ import numpy as np
 
 from graben.errors import BadInput, Fault
 from graben.mechanics.fitting.curves import Curve, since_first
-from graben.schemas.artifact import read_artifact
+from graben.schemas.artifact import read_arrays
 from graben.schemas.text_table import TextTable, read_text_table
 from graben.stages.calibrate.measured_columns import AXES, EXPECTED, NEEDED, Columns, read_columns, understood
 from graben.stages.calibrate.measured_tests import Rows, tell_apart
@@ -201,7 +201,7 @@ def _warn_loaded(path: str, about: dict[str, Any]) -> None:
 
 
 def _artifact(path: Path, reading: Reading) -> Measured:
-    data = read_artifact(path, "curves")
+    data = read_arrays(path, "curves")
     curves, faults, tests = [], [], []
     for p, name in enumerate(map(str, data["path_name"].values)):
         n = int(data["step_count"].values[p])

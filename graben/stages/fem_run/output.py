@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,11 @@ from graben.schemas.files import together
 from graben.schemas.layouts.fem import LAYOUT
 from graben.schemas.scenes.fem import FemScene, Stepping
 from graben.schemas.vtk import vtu_series
+from graben.stages.shared.fields import kept
 from graben.stages.shared.record import Record
+
+SPARE = {name: name for name in ("stress", "strain", "plastic_strain", "damage")}
+"""Variables of the artifact that nobody needs but who asks for the field."""
 
 Saved = tuple[float, State, np.ndarray]
 """Load time, s, a state, and its internal forces (2 n,), N/m."""
@@ -105,8 +109,9 @@ def write_run(
     arrays: dict[str, Any],
     headline: dict[str, Any],
     partial: str = "",
+    asked: Sequence[str] | None = None,
 ) -> None:
-    """Write the artifact and, beside it, the VTU series."""
+    """Write the artifact and, beside it, the VTU series; asked : names of fields, None: all."""
     failure = headline["failure_load_pa"]
     attributes = {
         "failed": int(headline["failed"]),
@@ -115,7 +120,7 @@ def write_run(
         "stiffness_ratio": headline["stiffness_ratio"],
     }
     with together():
-        with vtu_series(path) as series:
+        with vtu_series(path, "", asked) as series:
             for k, time in enumerate(arrays["time"]):
                 stress, strain = arrays["stress"][k], arrays["strain"][k]
                 fields = {
@@ -131,7 +136,7 @@ def write_run(
                     "gravity_displacement": arrays["gravity_displacement"],
                 }
                 series.add(time, mesh.points, {"quad": mesh.quads}, points, fields)
-        write_artifact(path, LAYOUT, arrays, record, attributes, partial=partial)
+        write_artifact(path, LAYOUT, kept(asked, arrays, SPARE), record, attributes, partial=partial)
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:

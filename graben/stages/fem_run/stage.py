@@ -76,7 +76,7 @@ def run(
     def write(path: Path, partial: str = "") -> Path:
         record.cost |= analysis.cost
         record.warn(analysis.headline["warnings"])
-        write_run(path, record, problem.body.mesh, analysis.arrays(), analysis.headline, partial)
+        write_run(path, record, problem.body.mesh, analysis.arrays(), analysis.headline, partial, scene.output.fields)
         return path
 
     keep_by(lambda why: write(last_good, why) if analysis.begun else None)

@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray
 
 from graben.errors import BadInput, Fault
 from graben.mechanics.averaging.spheres import best_fit_gradient, love_weber
-from graben.schemas.artifact import read_artifact
+from graben.schemas.artifact import read_arrays
 from graben.stages.shared.record import Progress
 
 _AXES = (0, 2, 1)
@@ -216,7 +215,7 @@ def _ball_faults(bed: _Bed, radius: float, centre: Floats, chosen_at: int) -> li
 
 def _beds(path: Path) -> list[_Bed]:
     """The beds of one artifact, from the end of the first phase (settled) on: what was poured has no strain."""
-    data = read_artifact(path, "particles")
+    data = read_arrays(path, "particles")
     of, names = data["particle_bed"].values, data["state_name"].values.tolist()
     whole = "state_contact_count" in data
     beds = []
@@ -251,7 +250,7 @@ def _beds(path: Path) -> list[_Bed]:
     return beds
 
 
-def _saved(data: xarray.Dataset, bed: int, state: int, first: int) -> _State:
+def _saved(data: Any, bed: int, state: int, first: int) -> _State:
     count = data["state_contact_count"].values
     start = int(count.ravel()[: bed * count.shape[1] + state].sum())
     part = slice(start, start + int(count[bed, state]))
@@ -260,7 +259,7 @@ def _saved(data: xarray.Dataset, bed: int, state: int, first: int) -> _State:
     return _sides(pair, force, arm, data["particle_radius"].values, first)
 
 
-def _last(data: xarray.Dataset, mine: np.ndarray) -> _State:
+def _last(data: Any, mine: np.ndarray) -> _State:
     """What artifacts without forces by state have: normal forces between spheres at the end."""
     pair = data["contact_particle"].values
     here = np.isin(pair[:, 0], mine)

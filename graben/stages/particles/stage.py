@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,10 +30,13 @@ from graben.schemas.scenes.particles import ParticlesScene
 from graben.schemas.vtk import vtu_series, write_vtu
 from graben.stages.shared.estimate import Estimate, refuse_too_large, work
 from graben.stages.shared.fidelity import setting
+from graben.stages.shared.fields import kept
 from graben.stages.shared.last_good import keep_by, keeps_last_good, write_whole
 from graben.stages.shared.measures import Measure, warnings_of
 from graben.stages.shared.record import Progress, Record, silent
 
+# Variables of the artifact that no later stage needs, and the field that each of them is.
+_SPARE = {"velocity": "velocity", "coordination": "coordination"}
 _GRAIN_BYTES = 4000.0  # states, contacts and their histories
 
 
@@ -80,8 +84,8 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
     record.warn(warnings_of(_measures(record.cost)))
     with together():
         if scene.output.vtk:
-            _write_vtk(output, law, beds[0])
-        write_whole(output, LAYOUT, arrays, record)
+            _write_vtk(output, law, beds[0], scene.output.fields)
+        write_whole(output, LAYOUT, kept(scene.output.fields, arrays, _SPARE), record)
     classes = [
         {
             "name": g.name,
@@ -297,9 +301,9 @@ def _write_last_good(output: Path, state: Snapshot) -> Path:
     return path
 
 
-def _write_vtk(output: Path, law: LinearLaw, bed: Bed) -> None:
+def _write_vtk(output: Path, law: LinearLaw, bed: Bed, fields: Sequence[str] | None) -> None:
     """Spheres as points with a radius (glyph them in ParaView), one file per phase; forces for the last."""
-    with vtu_series(output) as series:
+    with vtu_series(output, "", fields) as series:
         cells = {"vertex": np.arange(len(bed.radius))[:, None]}
         last = list(bed.states)[-1]
         for name, position in bed.states.items():

@@ -171,7 +171,7 @@ def write_run(
         "largest_plastic_strain": float(result.unloaded.plastic_strain.max()),
     }
     with together():
-        with vtu_series(output) as series:
+        with vtu_series(output, "", scene.output.fields) as series:
             for frame in result.frames:
                 series.add(frame.time, *fields(mesh, frame))
         write_whole(output, LAYOUT, arrays, record)

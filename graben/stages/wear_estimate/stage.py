@@ -12,7 +12,7 @@ import numpy as np
 from graben.errors import BadInput, Fault, Incomplete, Refused
 from graben.mechanics.wear.counts import contacts_per_area, doubts
 from graben.mechanics.wear.rate import GrooveTable, balanced_forces, carried_load, wear_rates
-from graben.schemas.artifact import read_artifact
+from graben.schemas.artifact import read_arrays
 from graben.schemas.layouts.wear import LAYOUT
 from graben.schemas.outputs import Outputs, files_of
 from graben.schemas.scene import Given, Overrides, load_scene
@@ -158,7 +158,7 @@ def _shares(scene: WearScene, mixture: Mixture) -> np.ndarray:
 def _read_bed(scene: WearScene, path: Path, faults: list[Fault]) -> _BedCounts | None:
     """Counts of a bed in the order of the scene's classes; adds a fault for each thing that does not fit."""
     try:
-        bed = read_artifact(path, "particles")
+        bed = read_arrays(path, "particles")
     except BadInput as error:
         faults.extend(error.faults)
         return None
@@ -193,7 +193,7 @@ def _grooves(scene: WearScene, name: str, files: list[Path], faults: list[Fault]
     known = [_Known(g.force, g.area, g.degree_of_wear) for g in grain.grooves]
     for path in files:
         try:
-            scratch = read_artifact(path, "scratch")
+            scratch = read_arrays(path, "scratch")
         except BadInput as error:
             faults.extend(error.faults)
             continue

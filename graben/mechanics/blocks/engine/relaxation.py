@@ -256,7 +256,7 @@ def advance(me, board, plan, sums, m, steps, s, parts, pairs, joints, rules):
             return LEFT_ALONE, step, -1
         bad = _deep(now)
         if bad >= 0:
-            m.ledger[LARGEST_OVERLAP] = now[:, AT_OVERLAP].max()
+            m.ledger[LARGEST_OVERLAP] = _worst(now[:, AT_OVERLAP])
             return DEEP_OVERLAP, step, bad
         if not _gather(m, now, damping_ratio, damping_limit, alpha, dt) < fastest:
             return RUNAWAY, step, -1

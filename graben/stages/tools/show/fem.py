@@ -16,14 +16,20 @@ def draw(dataset: Any, figure: Any) -> None:
     largest = float(np.hypot(*movement.T).max())
     scale = 0.04 * extent / largest if largest > 0 else 1.0
     corners = (nodes + scale * movement)[quads]
-    stress = dataset["stress"].values[-1]
     axes = figure.subplots(2, 3)
-    _field(figure, axes[0, 0], corners, stress[:, 1] / 1e6, "vertical stress (MPa)", "viridis")
-    axes[0, 0].set_title(f"vertical stress, deformation x {scale:.3g}", fontsize=10)
-    _field(figure, axes[0, 1], corners, stress[:, 0] / 1e6, "horizontal stress (MPa)", "viridis")
-    _field(figure, axes[0, 2], corners, stress[:, 3] / 1e6, "shear stress (MPa)", "RdBu_r", centred=True)
-    plastic = dataset["plastic_strain"].values[-1]
-    _field(figure, axes[1, 0], corners, 100 * plastic, "equivalent plastic strain (%)", "magma_r")
+    # What `output.fields` left out has an empty place.
+    if "stress" in dataset:
+        stress = dataset["stress"].values[-1]
+        _field(figure, axes[0, 0], corners, stress[:, 1] / 1e6, "vertical stress (MPa)", "viridis")
+        axes[0, 0].set_title(f"vertical stress, deformation x {scale:.3g}", fontsize=10)
+        _field(figure, axes[0, 1], corners, stress[:, 0] / 1e6, "horizontal stress (MPa)", "viridis")
+        _field(figure, axes[0, 2], corners, stress[:, 3] / 1e6, "shear stress (MPa)", "RdBu_r", centred=True)
+    if "plastic_strain" in dataset:
+        plastic = dataset["plastic_strain"].values[-1]
+        _field(figure, axes[1, 0], corners, 100 * plastic, "equivalent plastic strain (%)", "magma_r")
+    for place in axes.flat:
+        if not place.has_data() and place not in (axes[1, 1], axes[1, 2]):
+            place.set_axis_off()
     _history(dataset, axes[1, 1])
     _surface(dataset, axes[1, 2])
 
