@@ -42,7 +42,8 @@ def kernel(function: Callable[..., Any] | None = None, *, pairing: bool = False,
     if isinstance(dispatcher, CPUDispatcher):  # not so under NUMBA_DISABLE_JIT
         _spare_wrappers(dispatcher, function, options)
         if pairing:
-            dispatcher._compiler.compile = _with_pairing(dispatcher._compiler.compile)
+            compiler: Any = getattr(dispatcher, "_compiler")  # noqa: B009
+            compiler.compile = _with_pairing(compiler.compile)
     return dispatcher
 
 
