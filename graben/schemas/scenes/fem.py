@@ -169,6 +169,7 @@ class Output(Model):
     fields: list[FemField] | None = key(
         None,
         "fields of VTU files; the artifact also lacks what no later stage needs; left out: all",
+        max_length=50,
     )
 
 

@@ -107,6 +107,7 @@ class Output(Model):
     fields: list[Literal["radius", "class", "velocity", "coordination", "floor_force"]] | None = key(
         None,
         "fields of VTU files; the artifact also lacks what no later stage needs; left out: all",
+        max_length=50,
     )
 
 

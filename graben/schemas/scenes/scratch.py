@@ -133,7 +133,7 @@ class Output(Model):
     )
     points: Integer = key(181, "points per section", ge=11, le=5000)
     fields: list[Literal["displacement", "stress", "von_mises", "plastic_strain", "damage"]] | None = key(
-        None, "fields of VTU files; left out: all"
+        None, "fields of VTU files; left out: all", max_length=50
     )
 
 

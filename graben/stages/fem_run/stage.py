@@ -29,7 +29,8 @@ from graben.stages.shared.record import Progress, Record, silent
 
 # A collapse lets the ground move so many times as far per load as at first, or leaves so little of its stiffness.
 # Where a march only lost its way neither does: 3.8 and .42 were seen at half of a limit load, 5 to 50 at collapses.
-_COMPLIANT, _SOFT = 5.0, 0.3
+# What had hardly yielded says nothing: a uniform column fails as it yields first, 2.1 and .51 within .1 % of its load.
+_HARDLY, _COMPLIANT, _SOFT = 2.5, 5.0, 0.3
 
 # Gravity is a load history of its own, of unit length, in steps that are halved as the pressures' are.
 _GRAVITY_STEPS = StepOptions(first=0.1, largest=0.5, smallest=1e-3)
@@ -198,7 +199,7 @@ def _headline(scene: FemScene, problem: Problem, settled: March, loaded: March, 
     hidden = problem.pressure.hidden(scene.stepping.relaxation)
     known = loaded.time > 0.0 and carried > hidden
     compliance, softness = curve.compliance_ratio(), stiffness / elastic if elastic > 0 else 0.0
-    collapsed = compliance >= _COMPLIANT or softness <= _SOFT
+    collapsed = not _HARDLY < compliance < _COMPLIANT or softness <= _SOFT
     if failed and loaded.time == 0.0:
         reason = f"no equilibrium at the smallest rise of the load that was tried; {reason}"
     elif failed and not known:

@@ -341,7 +341,7 @@ def test_a_march_that_stops_without_a_collapse_has_no_failure_load(tmp_path, mon
     assert "that is no collapse" in headline["reason"] and "not known" in headline["warnings"][0]
 
 
-@pytest.mark.parametrize(("compliance", "stiffness"), [(3.8, 0.1), (16.0, 0.42)])
+@pytest.mark.parametrize(("compliance", "stiffness"), [(3.8, 0.1), (16.0, 0.42), (1.2, 0.9)])
 def test_either_evidence_is_enough_for_a_collapse(tmp_path, monkeypatch, compliance, stiffness):
     monkeypatch.setattr(LoadCurve, "compliance_ratio", lambda self: compliance)
     ratios = iter([1.0, stiffness])
