@@ -29,7 +29,7 @@ from graben.stages.shared.record import Progress, Record, silent
 
 # A collapse lets the ground move so many times as far per load as at first, or leaves so little of its stiffness.
 # Where a march only lost its way neither does: 3.8 and .42 were seen at half of a limit load, 5 to 50 at collapses.
-# What had hardly yielded says nothing: a uniform column fails as it yields first, 2.1 and .51 within .1 % of its load.
+# What had hardly yielded says nothing: a uniform column fails as it first yields (2.1 and .51, within .1 %).
 _HARDLY, _COMPLIANT, _SOFT = 2.5, 5.0, 0.3
 
 # Gravity is a load history of its own, of unit length, in steps that are halved as the pressures' are.
