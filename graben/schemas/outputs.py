@@ -268,9 +268,13 @@ def picture_mark(form: str) -> dict[str, str]:
     return {"Software" if form == ".png" else "Creator": _DRAWN}
 
 
+_OF_MATERIAL = {"law", "parameters", "warnings"}
+
+
 def _material(path: Path, main: Path) -> bool:
     text = path.read_text(encoding="utf-8")
-    return text.startswith("#") and set(tomllib.loads(text)) == {"law", "parameters"} and "# fitted to" in text
+    keys = set(tomllib.loads(text))
+    return text.startswith("#") and {"law", "parameters"} <= keys <= _OF_MATERIAL and "# fitted to" in text
 
 
 def _npz(path: Path, main: Path) -> bool:
