@@ -167,7 +167,8 @@ def _buried(scene: ParticlesScene, law: LinearLaw) -> Iterator[Fault]:
 def _never_settled(scene: ParticlesScene, law: LinearLaw, recipe: BedRecipe) -> Iterator[Fault]:
     """A fault where the grains' fall alone takes more steps than a bed may."""
     solid = NOMINAL_FRACTION * scene.box.width**2 * scene.box.depth
-    fall = math.sqrt(2.0 * column_height(law, recipe, solid) / recipe.gravity)
+    # The topmost grains fall by what is loose of the column, more than half of it.
+    fall = math.sqrt(column_height(law, recipe, solid) / recipe.gravity)
     steps = fall / (recipe.safety * critical_step(law))
     if steps > recipe.max_steps:
         expected = f"at least {steps:.3g}, the steps of the fall alone; softer contacts have longer steps"
