@@ -232,7 +232,9 @@ class BlocksScene(Scene):
     def _consistent(self) -> BlocksScene:
         faults = []
         t, d = self.tessellation, self.domain
-        if t.edge > 0.5 * d.smallest_side:
+        # A map brings its own size, which is known where it is read.
+        sized = t.method != "file" or bool({"width", "height", "outline"} & d.model_fields_set)
+        if sized and t.edge > 0.5 * d.smallest_side:
             faults.append(f"tessellation.edge of at most half the domain (found {t.edge:.4g} m)")
         if t.method == "file" and t.file is None:
             faults.append('tessellation.file, because method = "file"')
@@ -271,7 +273,7 @@ class BlocksScene(Scene):
             faults.append("in_situ.k0 with a [programme], which has weight")
         if self.programme is None and d.outline is not None:
             faults.append("[programme] with a domain.outline ([loading] compresses the rectangle)")
-        elif self.programme is None and strain > 0.5:
+        elif self.programme is None and sized and strain > 0.5:
             faults.append(f"loading that shortens the domain by at most one half (found {strain:.3g})")
         if faults:
             raise ValueError("; ".join(faults))

@@ -17,7 +17,7 @@ _BLOCK_BYTES = 4000.0  # model, contacts and candidates
 _STATE_BYTES = 600.0  # of a block with four zones in one saved state
 
 
-def steps_of(scene: BlocksScene, blocks: float) -> int:
+def steps_of(scene: BlocksScene, blocks: float, outline: np.ndarray | None = None) -> int:
     """Steps of loading: those of the scene, or those of its fidelity and no fewer than inertia allows.
 
     Scaled masses make the wave cross a block in about a step, so the inertial number of a compression by the strain
@@ -27,13 +27,14 @@ def steps_of(scene: BlocksScene, blocks: float) -> int:
     Parameters
     ----------
     blocks : their number, estimated or counted
+    outline : (n, 2) m, of the blocks where they are known: a map brings its own
     """
     rule = setting(scene, "numerics.steps")
     if isinstance(rule, int):
         return rule
     if scene.programme is not None:
         return int(rule.steps)
-    loading, corners = scene.loading, np.array(scene.domain.corners)
+    loading, corners = scene.loading, np.array(scene.domain.corners) if outline is None else outline
     width, height = np.ptp(corners, axis=0)
     fastest = max(abs(v) for _, v in loading.speed_course or ((0.0, loading.speed),))
     strain = fastest * loading.duration / height

@@ -145,7 +145,7 @@ def prepare(scene: BlocksScene) -> Prepared:
     refuse_too_large(file, sizes)
     ground = lay_out(scene)
     scene = ground.scene
-    steps = steps_of(scene, ground.blocks.size)
+    steps = steps_of(scene, ground.blocks.size, ground.blocks.outline)
     if biaxial_test and scene.loading.states > steps + 1:
         expected = f"at most {steps + 1}: one state a step"
         raise BadInput(Fault(str(file), "loading.states", str(scene.loading.states), expected))
