@@ -1,4 +1,4 @@
-"""Averages at the edges: an area of one block, one larger than the body, a pinched outline, one sample; invariance."""
+"""Averages at the edges: one block, an area beyond the body, a pinched outline, one sample; invariance."""
 
 import json
 from dataclasses import replace

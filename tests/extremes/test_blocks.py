@@ -146,7 +146,8 @@ def test_a_scene_in_mm_and_mpa_is_the_same_scene(tmp_path):
     text = scene.read_text()
     for old, new in (
         ("500000.0 Pa", "0.5 N/mm^2"), ("10000000000.0 Pa/m", "10 N/mm^2/mm"), ("1000000000.0 Pa/m", "1 MPa/mm"),
-        ("0.0001 m/s", "0.1 mm/s"), ("65000000000.0 Pa", "65000 MPa"), ('"0.01 m"', '"10 mm"'), ('"0.5 m"', '"500 mm"'),
+        ("0.0001 m/s", "0.1 mm/s"), ("65000000000.0 Pa", "65000 MPa"), ('"0.01 m"', '"10 mm"'),
+        ('"0.5 m"', '"500 mm"'),
     ):  # fmt: skip
         assert old in text, old
         text = text.replace(old, new)

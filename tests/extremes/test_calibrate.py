@@ -1,4 +1,4 @@
-"""Fits at the edges: exact data, one curve, thousands of points, all on bounds, nothing to see, failures in between."""
+"""Fits at the edges: exact data, thousands of points, all on bounds, nothing to see, failures in between."""
 
 import json
 
@@ -9,7 +9,10 @@ from tests.conftest import command
 
 E, NU, CELL = 10e9, 0.25, 1e6
 PLANE = E / (1 - NU**2)
-FREE = '[free]\nyoung_modulus = {lower = "1 GPa", upper = "50 GPa", scale = "log"}\npoisson_ratio = {lower = 0.05, upper = 0.45}\n'
+FREE = (
+    '[free]\nyoung_modulus = {lower = "1 GPa", upper = "50 GPa", scale = "log"}\n'
+    "poisson_ratio = {lower = 0.05, upper = 0.45}\n"
+)
 
 
 def curve(path, strain, stress, lateral):
@@ -77,7 +80,7 @@ def test_a_flat_objective_tells_no_parameter(tmp_path):
 
 
 def test_an_objective_that_fails_in_half_of_the_space_finds_the_other_half(tmp_path):
-    """Dilation above friction is no material: half of the box. The curve of a material in the other half comes back."""
+    """Dilation above friction is no material: half of the box. A material of the other half comes back."""
     from graben.mechanics.materials.laws import pack
     from graben.mechanics.materials.point import follow
 

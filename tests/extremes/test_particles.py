@@ -113,8 +113,8 @@ def test_an_impact_at_any_speed_has_the_same_restitution(damping, speed):
 def test_two_spheres_at_1000_m_s_keep_energy_and_momentum():
     """Stiff enough that they meet within a tenth of a radius: elastic exchange of velocities."""
     hard = law(normal_stiffness=[1e12], wall_stiffness=1e12, damping=0.0)
-    box = Assembly(hard, np.array([[0.018, 0.02, 0.02], [0.0202, 0.02, 0.02]]), np.zeros(2), (0.04, 0.04), gravity=0.0,
-                   safety=0.02)  # fmt: skip
+    x = np.array([[0.018, 0.02, 0.02], [0.0202, 0.02, 0.02]])
+    box = Assembly(hard, x, np.zeros(2), (0.04, 0.04), gravity=0.0, safety=0.02)
     box.bodies.velocity[box.bodies.identity == 0, 0] = 1000.0
     before = box.energy()["total"]
     while not box.survey()[0].contacts:

@@ -13,7 +13,7 @@ from graben.mechanics.materials.laws import LAWS, pack
 from graben.mechanics.scratch.mesh import specimen
 from graben.mechanics.scratch.run import ScratchFailed, simulate
 from graben.mechanics.scratch.setup import Numerics, Tip
-from tests.conftest import command
+from tests.conftest import command, settings
 
 QUICK = {"indent_speed": 0.01, "slide_speed": 0.05, "lift_speed": 0.02, "rest_steps": 100}
 
@@ -84,7 +84,7 @@ def test_grains_of_0_1_um_and_1_mm_scratch_alike(unit: float) -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.1, 0.5, 1.0, 2.0])
 def test_apparent_friction_lies_between_ploughing_and_the_steepest_contact(friction: float) -> None:
-    """Each node bears a normal force within the contact's angle and friction times it: F_t / F_n <= tan(mu + angle)."""
+    """Each node bears a normal force within the contact's angle, and friction times it: tan(mu + angle) at most."""
     run = scratch(friction=friction, volume_limit=0.3)
     sliding = run.phase == 1
     last = np.flatnonzero(sliding)[-3:]
@@ -131,13 +131,16 @@ def test_a_dent_of_a_nanometre_is_hertz_on_its_own_contact() -> None:
 @pytest.mark.verify
 def test_an_elastic_specimen_springs_back_and_gets_no_degree_of_wear(tmp_path) -> None:  # type: ignore[no-untyped-def]
     """What vibration leaves of a groove is no groove."""
-    (tmp_path / "s.toml").write_text(
-        'kind = "scratch"\nfidelity = "draft"\n[specimen]\nlength = "90 um"\nwidth = "80 um"\n[mesh]\nsize = "2.5 um"\n'
-        'draft_factor = 1.0\n[tip]\ndepth = "0.2 um"\nstart = "35 um"\npath = "3 um"\n[material]\nlaw = "elastic"\n'
-        '[material.parameters]\nyoung_modulus = "210 GPa"\npoisson_ratio = 0.33\n[numerics]\nindent_speed = 0.002\n'
-        "slide_speed = 0.05\nlift_speed = 0.02\npenalty = 2.0\n[output]\nframes = 0\nsections = 11\npoints = 41\n"
-    )
-    result = command("scratch", tmp_path / "s.toml", "-o", tmp_path / "s.nc", "--json", "-q")
+    (tmp_path / "s.toml").write_text('kind = "scratch"\nfidelity = "draft"\n')
+    values = {
+        "specimen.length": '"90 um"', "specimen.width": '"80 um"', "mesh.size": '"2.5 um"', "mesh.draft_factor": 1.0,
+        "tip.depth": '"0.2 um"', "tip.start": '"35 um"', "tip.path": '"3 um"', "numerics.indent_speed": 0.002,
+        "numerics.slide_speed": 0.05, "numerics.lift_speed": 0.02, "numerics.penalty": 2.0, "output.frames": 0,
+        "output.sections": 11, "output.points": 41,
+        "material": '{law = "elastic", parameters = {young_modulus = "210 GPa", poisson_ratio = 0.33}}',
+    }  # fmt: skip
+    changes = settings(f"{key}={value}" for key, value in values.items())
+    result = command("scratch", tmp_path / "s.toml", *changes, "-o", tmp_path / "s.nc", "--json", "-q")
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
     assert found["degree_of_wear"] is None

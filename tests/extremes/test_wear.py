@@ -76,6 +76,7 @@ def test_a_thousand_classes_of_which_two_have_a_share(tmp_path):
 @pytest.mark.parametrize("scale", [1e-6, 1e3])
 def test_lengths_scale(tmp_path, scale):
     """All lengths by s at one stress (forces by s2): contacts stay, grooves and speed give s3."""
+
     def scene(s):
         return (
             f'[machine]\nwheel_diameter = "{0.2285 * s!r} m"\ncontact_area = "{114.3e-6 * s * s!r} m^2"\n'

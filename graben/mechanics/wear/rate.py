@@ -51,11 +51,12 @@ def balanced_forces(contacts: Floats, area: float, load: float, relative: Floats
 
 
 def refuse_buried(name: str, area: float, radius: float) -> None:
-    """Refused where a groove (m2) is larger than a grain of this radius (m) leaves with half of itself in the tool."""
+    """Refused where a groove (m2) is larger than a grain of this radius (m) leaves when half of it is sunk in."""
     largest = 0.5 * np.pi * radius**2
     if area > largest:
         raise Refused(
-            f"{name}: a groove of at most {largest:.4g} m2, half of the grain's own section; {area:.4g} m2 would bury it"
+            f"{name}: a groove of at most {largest:.4g} m2, half of the grain's own section; "
+            f"{area:.4g} m2 would bury it"
         )
 
 

@@ -126,7 +126,9 @@ class BiaxialReport:
             "confining_stress_pa": float(arrays["confining_stress"]),
             "peak_wall_stress_pa": number(vertical[peak]),
             # What the top has moved: its speed rises over the first steps, so speed times time is too much.
-            "strain_at_peak": number(arrays["displacement"][peak, bodies.vertex_side[:, sides.top], 1].mean() / size[1]),
+            "strain_at_peak": number(
+                arrays["displacement"][peak, bodies.vertex_side[:, sides.top], 1].mean() / size[1]
+            ),
             "steps": self.model.steps_done,
             "loose_blocks": int(arrays["loose_blocks"].max()),
             "flown_blocks": len(flown),

@@ -34,7 +34,7 @@ from graben.stages.shared.last_good import keep_by, keeps_last_good, write_whole
 from graben.stages.shared.measures import Measure, warnings_of
 from graben.stages.shared.record import Progress, Record, silent
 
-# Mean overlap over the smallest diameter: half of what stops a run, and three times the most that a scene may ask for.
+# Mean overlap over the smallest diameter: half of what stops a run, three times the most that a scene may ask for.
 _MOST_OVERLAP = 0.15
 _GRAIN_BYTES = 4000.0  # states, contacts and their histories
 
@@ -148,7 +148,7 @@ def prepare(scene: ParticlesScene) -> tuple[LinearLaw, BedRecipe, list[Estimate]
 
 
 def _buried(scene: ParticlesScene, law: LinearLaw) -> Iterator[Fault]:
-    """A fault where weight and pressure at rest press grains into one another further than points of contact allow."""
+    """A fault where weight and pressure at rest press grains together further than points of contact allow."""
     density = float(sum(g.share * g.density for g in scene.grains))
     weight = NOMINAL_FRACTION * density * scene.loading.gravity * scene.box.depth
     smallest, stiffness = min(g.diameter for g in scene.grains), float(law.normal_stiffness.min())
@@ -158,8 +158,8 @@ def _buried(scene: ParticlesScene, law: LinearLaw) -> Iterator[Fault]:
         least = pushed / _MOST_OVERLAP
         found = f"{stiffness:.4g} N/m" + ("" if scene.contact.normal_stiffness else " (from pressure and overlap)")
         expected = (
-            f"at least {least:.4g} N/m: under {scene.loading.pressure:.4g} Pa and {weight:.4g} Pa of their own weight "
-            f"grains overlap by {100.0 * overlap:.3g} % of their diameter"
+            f"at least {least:.4g} N/m: under {scene.loading.pressure:.4g} Pa and {weight:.4g} Pa of their own "
+            f"weight grains overlap by {100.0 * overlap:.3g} % of their diameter"
         )
         yield Fault(str(scene.source.path), "contact.normal_stiffness", found, expected)
 

@@ -219,7 +219,7 @@ def _measures(headline: dict[str, Any], depth: float) -> list[Measure]:
         ),
         Measure(
             "groove_depth_m", headline["groove_depth_m"] / depth, math.inf,
-            "the groove is {percent} as deep as the tip went: the specimen sprang back, and no degree of wear is given",
+            "the groove is {percent} as deep as the tip went: the specimen sprang back, and has no degree of wear",
             least=LEAST,
         ),
         Measure(
