@@ -138,12 +138,12 @@ def simulate(
             loaded = kept[-1]
             overlap = _overlap(loaded, tip) / tip.depth
             if overlap > _DEEPEST:
-                failure = NumericsFailed(
+                soft = NumericsFailed(
                     f"the tip overlaps the surface by {100 * overlap:.3g} % of its depth at the end of {phase.name}",
                     step=body.steps,
                     advice="raise numerics.penalty: contact is too soft to dent the specimen",
                 )
-                raise ScratchFailed(failure, loaded)
+                raise ScratchFailed(soft, loaded)
     try:
         _rest(body, numerics, rows, len(phases), damage is not None, reference)
     except NumericsFailed as failure:
