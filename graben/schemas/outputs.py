@@ -252,7 +252,9 @@ def _text(pattern: str) -> Callable[[Path, Path], bool]:
 
 def _pvd(path: Path, main: Path) -> bool:
     """A PVD of this artifact: -joints.pvd of one run and the .pvd of another called NAME-joints have one name."""
-    return owner_mark(main) in path.read_text(encoding="utf-8")
+    # The last good state of a run that failed is an artifact of its own.
+    owner = path.with_suffix(".nc") if path.stem == name_of(main) + LAST_GOOD else main
+    return owner_mark(owner) in path.read_text(encoding="utf-8")
 
 
 def owner_mark(output: Path) -> str:
@@ -266,9 +268,13 @@ def picture_mark(form: str) -> dict[str, str]:
     return {"Software" if form == ".png" else "Creator": _DRAWN}
 
 
+_OF_MATERIAL = {"law", "parameters", "warnings"}
+
+
 def _material(path: Path, main: Path) -> bool:
     text = path.read_text(encoding="utf-8")
-    return text.startswith("#") and set(tomllib.loads(text)) == {"law", "parameters"} and "# fitted to" in text
+    keys = set(tomllib.loads(text))
+    return text.startswith("#") and {"law", "parameters"} <= keys <= _OF_MATERIAL and "# fitted to" in text
 
 
 def _npz(path: Path, main: Path) -> bool:

@@ -203,8 +203,12 @@ def _override(tables: dict[str, Any], setting: str) -> None:
 
 
 def _faults(file: str, kind: str, error: ValidationError) -> list[Fault]:
-    faults = []
-    for e in error.errors(include_url=False):
+    faults, errors = [], error.errors(include_url=False)
+    inner = {e["loc"][:depth] for e in errors for depth in range(len(e["loc"]))}
+    for e in errors:
+        # A list whose values have faults of their own counts as empty.
+        if e["type"] == "too_short" and e["loc"] in inner:
+            continue
         where = ".".join(str(part) for part in e["loc"])
         value = e.get("input")
         if e["type"] == "missing":

@@ -301,3 +301,19 @@ class TestKilled:
         (tmp_path / f".a.pvd.{self.GONE}.old").write_bytes(b"old")
         Outputs(tmp_path / "a.nc", SERIES).claim([], overwrite=True)
         assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize("name", ["run.nc", "run"])
+def test_the_last_good_state_of_a_failed_run_may_be_replaced(tmp_path, name):
+    """Its PVD names an artifact of its own, NAME.last-good.nc."""
+    output = tmp_path / name
+    fields(beside(output, LAST_GOOD + ".nc"))
+    Outputs(output, kept=tuple(LAST_GOOD + end for end in SERIES)).claim([], overwrite=True)
+
+
+def test_a_material_file_with_warnings_may_be_replaced(tmp_path):
+    from graben.schemas.scenes.material import write_material
+
+    values = {"young_modulus": 1e9, "poisson_ratio": 0.2}
+    write_material(tmp_path / "c.material.toml", "elastic", values, "fitted to a curve", ["a doubt"])
+    Outputs(tmp_path / "c.nc", (MATERIAL,)).claim([], overwrite=True)

@@ -9,6 +9,7 @@ as the largest one to be accepted.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,7 +40,8 @@ class Criteria:
 
 @dataclass(frozen=True)
 class Convergence:
-    """One scalar, by radius (radius,); p-values are nan where there is nothing to test.
+    """One scalar, by radius (radius,); p-values are nan where there is nothing to test, and deviation and interval
+    where one sample tells of no scatter.
 
     mean_p: that the mean differs from that at the largest radius by the tolerance or more; variance_p: that the
     coefficient of variation is the accepted one or more. Small values are evidence that the radius is large enough
@@ -87,8 +89,10 @@ def convergence(values: Floats, criteria: Criteria, seed: int, independent: Floa
     if values.shape[2] >= 3:
         deviation = np.array([_deviation_over_runs(values[k]) for k in range(radii)])
     else:
-        deviation = np.array([flat[k, known[k]].std(ddof=1) if count[k] > 1 else 0.0 for k in range(radii)])
+        deviation = np.array([flat[k, known[k]].std(ddof=1) if count[k] > 1 else np.nan for k in range(radii)])
     low, high = bootstrap_interval(values, criteria.confidence, criteria.resamples, seed)
+    alone = count < 2
+    low[alone] = high[alone] = deviation[alone] = np.nan
     alpha = 1.0 - criteria.confidence
     margin = criteria.tolerance * abs(float(mean[-1]))
     mean_p = np.array([_equivalence_p(values[k], values[-1], margin) for k in range(radii)])
@@ -202,6 +206,12 @@ def independent_samples(centres: Floats, radii: Floats, runs: int) -> Floats:
     return result
 
 
+def once_each(blocks: Sequence[bytes]) -> Flags:
+    """(sample,) true for the first of all samples that average the same blocks: the others say nothing more."""
+    first = {key: k for k, key in reversed(list(enumerate(blocks)))}
+    return np.array([first[key] == k for k, key in enumerate(blocks)])
+
+
 @dataclass(frozen=True)
 class Recommendation:
     """The smallest radius at which every scalar has settled, or none, and why."""
@@ -228,10 +238,10 @@ def recommend(radii: Floats, by_name: dict[str, Convergence], independent: Float
         k = radii.size - 1
         if index == radii.size:
             scatter = c.deviation[k] / abs(c.mean[k]) if c.mean[k] != 0.0 else np.inf
+            shown = f"coefficient of variation {scatter:.3f}, " if c.count[k] > 1 else ""
             why = (
                 f"{last} has not settled at the largest radius, {radii[k]:g} m: its scatter is not shown to be "
-                f"small (coefficient of variation {scatter:.3f}, {int(c.count[k])} samples worth "
-                f"{independent[k]:.1f} independent ones)"
+                f"small ({shown}samples: {int(c.count[k])}, worth {independent[k]:.1f} independent ones)"
             )
         else:
             why = f"{last} still changes between {radii[k - 1]:g} m and the largest radius, {radii[k]:g} m"

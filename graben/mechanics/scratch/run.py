@@ -55,6 +55,10 @@ class ScratchRun:
     cost: dict[str, float] = field(default_factory=dict)
 
 
+# Overlap of tip and surface, over the depth, past which a run says nothing of the specimen.
+_DEEPEST = 0.5
+
+
 class ScratchFailed(NumericsFailed):
     """A run that cannot go on, with the last good state that was kept."""
 
@@ -132,6 +136,14 @@ def simulate(
         if phase.name != "lift":
             kept.append(body.snapshot(phase.name))
             loaded = kept[-1]
+            overlap = _overlap(loaded, tip) / tip.depth
+            if overlap > _DEEPEST:
+                soft = NumericsFailed(
+                    f"the tip overlaps the surface by {100 * overlap:.3g} % of its depth at the end of {phase.name}",
+                    step=body.steps,
+                    advice="raise numerics.penalty: contact is too soft to dent the specimen",
+                )
+                raise ScratchFailed(soft, loaded)
     try:
         _rest(body, numerics, rows, len(phases), damage is not None, reference)
     except NumericsFailed as failure:
@@ -154,6 +166,7 @@ def simulate(
         "volume_ratio_min": body.volume_range[0],
         "volume_ratio_max": body.volume_range[1],
         "wave_speed_m_per_s": wave,
+        "tip_overlap_share": _overlap(loaded, tip) / tip.depth,
         "removed_elements": float(len(mesh.cells) - body.alive.sum()),
     }
     energy = {name: table[:, 9 + i] for i, name in enumerate(ENERGIES)}
@@ -172,6 +185,12 @@ def simulate(
         first_volumes=body.first_volumes,
         cost=cost,
     )
+
+
+def _overlap(state: Snapshot, tip: Tip) -> float:
+    """How far the sphere reaches into the surface [m]: a penalty bears by overlap."""
+    surface = state.points[np.unique(state.faces)]
+    return tip.radius - float(np.linalg.norm(surface - state.tip, axis=1).min())
 
 
 def _record(body: Body, numerics: Numerics, reference: float, damaged: bool, early: bool) -> list[float]:

@@ -50,6 +50,16 @@ def balanced_forces(contacts: Floats, area: float, load: float, relative: Floats
     return load / total * relative
 
 
+def refuse_buried(name: str, area: float, radius: float) -> None:
+    """Refused where a groove (m2) is larger than a grain of this radius (m) leaves when half of it is sunk in."""
+    largest = 0.5 * np.pi * radius**2
+    if area > largest:
+        raise Refused(
+            f"{name}: a groove of at most {largest:.4g} m2, half of the grain's own section; "
+            f"{area:.4g} m2 would bury it"
+        )
+
+
 @dataclass(frozen=True)
 class GrooveTable:
     """Grooves known at some forces, and what follows for others.

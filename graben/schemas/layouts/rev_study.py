@@ -22,11 +22,11 @@ def _statistics(name: str, units: str, long_name: str) -> dict[str, Variable]:
 
     return {
         name: Variable(_SAMPLE, units, long_name, optional=True, may_be_nan=True),
-        f"{name}_count": by_radius("1", "samples that have a value", "i8"),
+        f"{name}_count": by_radius("1", "samples that have a value; of those of the same blocks one", "i8"),
         f"{name}_mean": by_radius(units, "mean"),
-        f"{name}_deviation": by_radius(units, "standard deviation of the samples"),
-        f"{name}_low": by_radius(units, "lower end of the bootstrap interval of the mean"),
-        f"{name}_high": by_radius(units, "upper end of the bootstrap interval of the mean"),
+        f"{name}_deviation": by_radius(units, "standard deviation of the samples", may_be_nan=True),
+        f"{name}_low": by_radius(units, "lower end of the bootstrap interval of the mean", may_be_nan=True),
+        f"{name}_high": by_radius(units, "upper end of the bootstrap interval of the mean", may_be_nan=True),
         f"{name}_mean_p": by_radius(
             "1", "p of t: the mean is off that at the largest radius by the tolerance or more", may_be_nan=True
         ),
@@ -60,11 +60,11 @@ _CALIBRATION = {
         ("parameter", *_FIT), "1", "value fitted to the curves of the sample, in parameter_unit", optional=True
     ),
     "parameter_at_bound": _by_parameter("samples whose value lies on a bound", "i8"),
-    "parameter_count": _by_parameter("samples that have a value", "i8"),
+    "parameter_count": _by_parameter("samples that have a value; of those of the same blocks one", "i8"),
     "parameter_mean": _by_parameter("mean"),
-    "parameter_deviation": _by_parameter("standard deviation of the samples"),
-    "parameter_low": _by_parameter("lower end of the bootstrap interval of the mean"),
-    "parameter_high": _by_parameter("upper end of the bootstrap interval of the mean"),
+    "parameter_deviation": _by_parameter("standard deviation of the samples", may_be_nan=True),
+    "parameter_low": _by_parameter("lower end of the bootstrap interval of the mean", may_be_nan=True),
+    "parameter_high": _by_parameter("upper end of the bootstrap interval of the mean", may_be_nan=True),
     "parameter_mean_p": _by_parameter(
         "p of t: the mean is off that at the largest radius by the tolerance or more", may_be_nan=True
     ),

@@ -32,6 +32,9 @@ from graben.stages.shared.record import Progress, Record, silent
 # What had hardly yielded says nothing: a uniform column fails as it first yields (2.1 and .51, within .1 %).
 _HARDLY, _COMPLIANT, _SOFT = 2.5, 5.0, 0.3
 
+# Displacement over the size of the body up to which small strains are a model of it.
+_SMALL = 0.1
+
 # Gravity is a load history of its own, of unit length, in steps that are halved as the pressures' are.
 _GRAVITY_STEPS = StepOptions(first=0.1, largest=0.5, smallest=1e-3)
 
@@ -56,7 +59,8 @@ def run(
     -------
     headline numbers: failure_load_pa (None when the end was reached without failure, or where the march stopped and
     nothing collapsed), last_load_pa (carried last), failed, largest_load_pa,
-    settlement_m of the loaded segment, compliance_ratio and stiffness_ratio (evidence of collapse), elements,
+    settlement_m of the loaded segment, movement_over_size (largest displacement over that of the body),
+    compliance_ratio and stiffness_ratio (evidence of collapse), elements,
     steps, energy_error, stabilisation_share (work of the viscous forces over that of the loads), and mesh_notes where
     something of a mesh file was left out or mended
 
@@ -194,7 +198,9 @@ def _headline(scene: FemScene, problem: Problem, settled: March, loaded: March, 
     if loaded.before is not None:
         increment = last.displacement - loaded.before.displacement
         stiffness = softest_stiffness(problem.body, last, increment, loaded.before)
-    carried = max(curve.carried)
+    carried = max(curve.carried) if failed else curve.carried[-1]
+    size = problem.body.mesh.diameter()
+    way = last.displacement.reshape(-1, 2)
     reason = loaded.reason
     hidden = problem.pressure.hidden(scene.stepping.relaxation)
     known = loaded.time > 0.0 and carried > hidden
@@ -214,6 +220,7 @@ def _headline(scene: FemScene, problem: Problem, settled: March, loaded: March, 
         "failed": failed,
         "largest_load_pa": problem.pressure.at(loaded.time),
         "settlement_m": curve.settlement[-1],
+        "movement_over_size": float(np.hypot(*way.T).max()) / size,
         "compliance_ratio": compliance,
         "stiffness_ratio": softness,
         "stabilisation_share": loaded.drag_work / loaded.external_work if loaded.external_work > 0 else 0.0,
@@ -231,6 +238,11 @@ def _measures(headline: dict[str, Any]) -> list[Measure]:
         Measure(
             "failure_load_pa", 1.0 if unknown else None, 0.0,
             f"the failure load is not known: {headline['reason']}",
+        ),
+        Measure(
+            "movement_over_size", headline["movement_over_size"], _SMALL,
+            "the body moved by {percent} of its size: strains and loads are those of small displacements, and say "
+            "nothing so far from the first shape",
         ),
         Measure(
             "energy_error", headline["energy_error"], 0.02,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,8 @@ from graben.stages.shared.record import Progress, Record, silent
 
 # Variables of the artifact that no later stage needs, and the field that each of them is.
 _SPARE = {"velocity": "velocity", "coordination": "coordination"}
+# Mean overlap over the smallest diameter: half of what stops a run, three times the most that a scene may ask for.
+_MOST_OVERLAP = 0.15
 _GRAIN_BYTES = 4000.0  # states, contacts and their histories
 
 
@@ -142,7 +144,38 @@ def prepare(scene: ParticlesScene) -> tuple[LinearLaw, BedRecipe, list[Estimate]
         check_recipe(law, recipe)
     except Refused as error:
         raise BadInput(Fault(str(file), "", "", f"a scene that can be run ({error})")) from error
+    faults = [*_buried(scene, law), *_never_settled(scene, law, recipe)]
+    if faults:
+        raise BadInput(faults)
     return law, recipe, sizes
+
+
+def _buried(scene: ParticlesScene, law: LinearLaw) -> Iterator[Fault]:
+    """A fault where weight and pressure at rest press grains together further than points of contact allow."""
+    density = float(sum(g.share * g.density for g in scene.grains))
+    weight = NOMINAL_FRACTION * density * scene.loading.gravity * scene.box.depth
+    smallest, stiffness = min(g.diameter for g in scene.grains), float(law.normal_stiffness.min())
+    pushed = 2.0 * (scene.loading.pressure + weight) * smallest
+    overlap = pushed / stiffness
+    if overlap > _MOST_OVERLAP:
+        least = pushed / _MOST_OVERLAP
+        found = f"{stiffness:.4g} N/m" + ("" if scene.contact.normal_stiffness else " (from pressure and overlap)")
+        expected = (
+            f"at least {least:.4g} N/m: under {scene.loading.pressure:.4g} Pa and {weight:.4g} Pa of their own "
+            f"weight grains overlap by {100.0 * overlap:.3g} % of their diameter"
+        )
+        yield Fault(str(scene.source.path), "contact.normal_stiffness", found, expected)
+
+
+def _never_settled(scene: ParticlesScene, law: LinearLaw, recipe: BedRecipe) -> Iterator[Fault]:
+    """A fault where the grains' fall alone takes more steps than a bed may."""
+    solid = NOMINAL_FRACTION * scene.box.width**2 * scene.box.depth
+    # The topmost grains fall by what is loose of the column, more than half of it.
+    fall = math.sqrt(column_height(law, recipe, solid) / recipe.gravity)
+    steps = fall / (recipe.safety * critical_step(law))
+    if steps > recipe.max_steps:
+        expected = f"at least {steps:.3g}, the steps of the fall alone; softer contacts have longer steps"
+        yield Fault(str(scene.source.path), "numerics.max_steps", str(recipe.max_steps), expected)
 
 
 def _sizes(scene: ParticlesScene, law: LinearLaw, recipe: BedRecipe) -> list[Estimate]:

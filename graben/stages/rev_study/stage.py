@@ -17,6 +17,7 @@ from graben.mechanics.averaging.representative import (
     Criteria,
     convergence,
     independent_samples,
+    once_each,
     recommend,
 )
 from graben.mechanics.averaging.rev import Circle
@@ -36,9 +37,9 @@ from graben.stages.shared.workers import compute
 
 _SAMPLE_BYTES = 20_000.0  # curves of a hundred states
 
-# One chunk of samples: the file, and its (radius, x, y); one result each: stress, strain, area, blocks.
+# One chunk of samples: the file, and its (radius, x, y); one result each: stress, strain, area, blocks, which ones.
 Chunk = tuple[Path, list[tuple[float, float, float]]]
-Sample = tuple[np.ndarray, np.ndarray, float, int]
+Sample = tuple[np.ndarray, np.ndarray, float, int, bytes]
 
 
 def prepare(scene: RevStudyScene, runs: int = 1) -> tuple[CalibrateScene | None, list[Estimate]]:
@@ -105,6 +106,7 @@ def run(
     end = 0.5 if law else 1.0
     samples = _sampled(chunks, processes, cluster, lambda f, words: progress(end * f, words))
     arrays = _arrays(runs, centres, samples, scene)
+    counts = _counts_once(samples, arrays["area"].shape)
     criteria = Criteria(
         scene.tests.confidence,
         scene.tests.tolerance,
@@ -112,8 +114,8 @@ def run(
         setting(scene, "tests.resamples"),
     )
     radii = np.asarray(scene.samples.radii)
-    independent = independent_samples(centres[0], radii, len(groups))
-    by_name = _statistics(arrays, criteria, scene, independent) if groups.shape[1] == 1 else {}
+    independent = np.minimum(independent_samples(centres[0], radii, len(groups)), counts.sum(axis=(1, 2)))
+    by_name = _statistics(arrays, counts, criteria, scene, independent) if groups.shape[1] == 1 else {}
     for name, c in by_name.items():
         arrays |= {f"{name}_{part}": values for part, values in _parts(c).items()}
     chosen: Sequence[str] = scene.curves.properties
@@ -124,8 +126,9 @@ def run(
             lambda f, words: progress(0.5 + 0.5 * f, words),
         )  # fmt: skip
         chosen = chosen_parameters(scene, fits)
+        of_fit = counts[:, :, groups].any(axis=3)
         by_name = {
-            name: convergence(values, criteria, scene.seed + k, independent)
+            name: convergence(np.where(of_fit, values, np.nan), criteria, scene.seed + k, independent)
             for k, (name, values) in enumerate(zip(fits.names, fits.value))
         }
         arrays |= _fit_arrays(runs, groups, fits, by_name)
@@ -323,7 +326,8 @@ def sample_chunk(chunk: Chunk) -> list[Sample]:
     results = []
     for radius, x, y in places:
         a = average(history, Circle((x, y), radius))
-        results.append((a.stress, a.strain, a.area, int(a.outline.blocks.sum())))
+        which = a.outline.blocks
+        results.append((a.stress, a.strain, a.area, int(which.sum()), np.packbits(which).tobytes()))
     return results
 
 
@@ -349,27 +353,36 @@ def _arrays(runs: list[Run], centres: np.ndarray, samples: list[Sample], scene: 
     def padded(part: np.ndarray) -> np.ndarray:
         return np.concatenate([part, np.full((longest - part.shape[0], 4), np.nan)])
 
-    measures = gathered([curve_measures(s, e, scene.curves.secant_level) for s, e, _, _ in samples])
+    measures = gathered([curve_measures(s, e, scene.curves.secant_level) for s, e, *_ in samples])
     return {
         "radius": np.asarray(scene.samples.radii),
         "centre_position": centres,
         "run_name": np.array([source.path.stem for source in runs]),
         "confining_stress": min((source.confining_stress for source in runs), key=abs),
-        "area": gathered([area for _, _, area, _ in samples]),
-        "block_count": gathered([blocks for *_, blocks in samples]),
+        "area": gathered([area for _, _, area, *_ in samples]),
+        "block_count": gathered([blocks for *_, blocks, _ in samples]),
         "stress": gathered([padded(s) for s, *_ in samples]),
         "strain": gathered([padded(e) for _, e, *_ in samples]),
         **{name: measures[..., k] for k, name in enumerate(MEASURES)},
     }
 
 
+def _counts_once(samples: list[Sample], shape: tuple[int, ...]) -> np.ndarray:
+    """(radius, centre, run) false for a sample whose blocks are those of an earlier centre of its run and radius."""
+    radii, centres, runs = shape
+    whole = np.empty((runs, centres, radii), dtype=object)
+    whole.ravel()[:] = [which for *_, which in samples]
+    first = np.array([[once_each(list(whole[run, :, r])) for r in range(radii)] for run in range(runs)])
+    return np.transpose(first, (1, 2, 0))
+
+
 def _statistics(
-    arrays: dict[str, Any], criteria: Criteria, scene: RevStudyScene, independent: np.ndarray
+    arrays: dict[str, Any], counts: np.ndarray, criteria: Criteria, scene: RevStudyScene, independent: np.ndarray
 ) -> dict[str, Convergence]:
-    """Convergence of each scalar that has a value at every radius."""
+    """Convergence of each scalar that has a value at every radius, of the samples that count."""
     by_name = {}
     for k, name in enumerate(MEASURES):
-        values = arrays[name]
+        values = np.where(counts, arrays[name], np.nan)
         if np.isfinite(values).any(axis=(1, 2)).all():
             by_name[name] = convergence(values, criteria, scene.seed + k, independent)
     return by_name

@@ -22,6 +22,8 @@ from graben.stages.shared.measures import number
 from graben.stages.shared.record import Record
 
 _STATES = ("loaded", "unloaded")
+# A groove that is shallower, over the depth of the tip, is what vibration left: the specimen sprang back.
+LEAST = 0.01
 
 
 @dataclass(frozen=True)
@@ -93,8 +95,8 @@ def _headline(
         return float(np.mean([getattr(s, name) for s in rows]))
 
     def wear(rows: list[Section]) -> float | None:
-        ag = mean(rows, "groove_area")
-        return (ag - mean(rows, "shoulder_area")) / ag if ag > 0.0 else None
+        ag, left = mean(rows, "groove_area"), mean(rows, "depth")
+        return (ag - mean(rows, "shoulder_area")) / ag if ag > 0.0 and left > LEAST * scene.tip.depth else None
 
     travelled = result.tip[:, 0] - start
     phases = list(result.phases)

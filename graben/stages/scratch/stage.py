@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from graben.mechanics.scratch.setup import Damage, Numerics, Tip
 from graben.schemas.outputs import LAST_GOOD, PARTIAL, SERIES, Outputs, files_of
 from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.scratch import ScratchScene
-from graben.stages.scratch.output import measure_groove, write_last_good, write_run
+from graben.stages.scratch.output import LEAST, measure_groove, write_last_good, write_run
 from graben.stages.shared.estimate import Estimate, refuse_too_large, work
 from graben.stages.shared.fidelity import factor_of
 from graben.stages.shared.last_good import keep_by, keeps_last_good
@@ -85,7 +86,7 @@ def run(
     progress(0.99, "sections")
     groove = measure_groove(scene, mesh, result)
     headline = {**groove.headline, **_cost(result)}
-    headline["warnings"] = record.warn(warnings_of(_measures(headline)))
+    headline["warnings"] = record.warn(warnings_of(_measures(headline, scene.tip.depth)))
     record.cost.update(result.cost)
     record.cost.update({k: headline[k] for k in ("energy_error", "hourglass_share", "kinetic_share_sliding")})
     record.cost["mesh_size_m"] = mesh_size(scene)
@@ -198,7 +199,7 @@ def _damage(scene: ScratchScene, law: Law) -> Damage | None:
     return Damage(scene.damage.growth_per_joule, scene.damage.remove_at, law.index("max_damage_step"))
 
 
-def _measures(headline: dict[str, Any]) -> list[Measure]:
+def _measures(headline: dict[str, Any], depth: float) -> list[Measure]:
     """What a user should know before trusting the groove."""
     # Wear by damage that took everything is the setting's, not the metal's.
     all_gone = headline["degree_of_wear"] if headline["removed_elements"] > 0 else None
@@ -215,6 +216,16 @@ def _measures(headline: dict[str, Any]) -> list[Measure]:
         Measure(
             "kinetic_share_sliding", headline["kinetic_share_sliding"], 0.05,
             "kinetic energy is {percent} of the internal energy while sliding: lower numerics.slide_speed",
+        ),
+        Measure(
+            "groove_depth_m", headline["groove_depth_m"] / depth, math.inf,
+            "the groove is {percent} as deep as the tip went: the specimen sprang back, and has no degree of wear",
+            least=LEAST,
+        ),
+        Measure(
+            "tip_overlap_share", headline["tip_overlap_share"], 0.2,
+            "the tip overlaps the surface by {percent} of its depth, by which the groove is too shallow: raise "
+            "numerics.penalty",
         ),
         Measure(
             "degree_of_wear", all_gone, 0.99,
@@ -235,6 +246,7 @@ def _cost(result: mechanics.ScratchRun) -> dict[str, Any]:
         "kinetic_share_sliding": float(np.median(share)),
         "volume_ratio_min": result.cost["volume_ratio_min"],
         "volume_ratio_max": result.cost["volume_ratio_max"],
+        "tip_overlap_share": result.cost["tip_overlap_share"],
         "removed_elements": int(result.cost["removed_elements"]),
         "elements": int(result.cost["elements"]),
         "steps": int(result.cost["steps"]),

@@ -11,7 +11,7 @@ import numpy as np
 
 from graben.errors import BadInput, Fault, Incomplete, Refused
 from graben.mechanics.wear.counts import contacts_per_area, doubts
-from graben.mechanics.wear.rate import GrooveTable, balanced_forces, carried_load, wear_rates
+from graben.mechanics.wear.rate import GrooveTable, balanced_forces, carried_load, refuse_buried, wear_rates
 from graben.schemas.artifact import read_arrays
 from graben.schemas.layouts.wear import LAYOUT
 from graben.schemas.outputs import Outputs, files_of
@@ -289,6 +289,8 @@ def _rate(
                     f"{mixture.name}, {scene.grains[i].name}: {d}"
                     for d in table.doubts(float(force[i]), 0.5 * diameter[i])
                 ]
+        for i in present:
+            refuse_buried(scene.grains[i].name, area[i], 0.5 * diameter[i])
     except Refused as error:
         raise BadInput(
             Fault(file, f"mixtures {mixture.name!r}", "", f"a mixture that can be rated ({error})")
