@@ -58,6 +58,8 @@ def march_of(stored: Arrays, body: Body) -> March:
     if bool(before) != bool(sizes) or bool(sizes) != (numbers["last_length"] > 0.0):
         raise Refused("before: the state before the last step, where there was one")
     nothing = np.zeros(body.pattern.size)
+    flags = map(bool, counts[len(_COUNTS) :])
+    others: dict[str, Any] = {**numbers, **dict(zip(_COUNTS, counts)), **dict(zip(_FLAGS, flags))}
     return March(
         state=state_of(part_of(stored, "state"), body),
         force=like(nothing, stored.get("force"), "force"),
@@ -66,7 +68,5 @@ def march_of(stored: Arrays, body: Body) -> March:
         reason=str(reason),
         iterations=[n - 1 for n in sizes],
         residuals=[tuple(row.tolist()) for row in np.split(residuals, np.cumsum(sizes)[:-1])] if sizes else [],
-        **numbers,
-        **dict(zip(_COUNTS, counts)),
-        **dict(zip(_FLAGS, map(bool, counts[len(_COUNTS) :]))),
-    )  # type: ignore[arg-type]
+        **others,
+    )

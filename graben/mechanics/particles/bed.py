@@ -108,7 +108,9 @@ class _Run:
     ) -> None:
         self.recipe, self.progress, self.keep = recipe, progress, keep
         self.place = -1  # of the phase in PHASES
-        self.calm = self.chunks = 0  # of the phase: samples in a row at which nothing was missing, and chunks of steps
+        self.calm = self.chunks = (
+            0  # of the phase: samples in a row at which nothing was missing, and chunks of steps
+        )
         self.shaken_from = 0.0  # s
         self.pace = 0.0  # half period of the slowest mode, s
         self.carried = (0.0, 0.0)  # by floor and walls before pressing, N
@@ -173,7 +175,7 @@ class _Run:
         self.last_good = self.snapshot()
         return s
 
-    def phase(self, name: str, begin: Callable[[], None], go: Callable[[], None]) -> None:
+    def phase(self, name: str, begin: Callable[[], None], go: Callable[[], object]) -> None:
         """One phase: one that is over already is passed over, and one under way is not begun again."""
         place = PHASES.index(name)
         if place > self.place:

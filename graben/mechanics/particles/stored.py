@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from graben.errors import Refused
@@ -72,10 +74,13 @@ def bring_back_assembly(box: Assembly, kind: Ints, stored: Arrays) -> None:
     _bring_back_contacts(box, numbers[0], part_of(stored, "contacts"))
     box.walls = _walls(box, floor + 1 + (piston >= 0), part_of(stored, "walls"))
     own = part_of(stored, "loads")
-    loads = {k: v if v is None else like(v, own.get(k), f"loads.{k}") for k, v in box.loads._asdict().items()}
+    loads: dict[str, Any] = {
+        k: v if v is None else like(v, own.get(k), f"loads.{k}") for k, v in box.loads._asdict().items()
+    }
     box.loads = box.loads._replace(**loads)
     box.dt = numbers[1]
-    box.drive = box.drive._replace(piston=piston, **dict(zip(_DRIVE, numbers[2:])))
+    drive: dict[str, Any] = dict(zip(_DRIVE, numbers[2:]))
+    box.drive = box.drive._replace(piston=piston, **drive)
     if piston >= 0 and not box.drive.piston_mass > 0.0:
         raise Refused("numbers: the mass of the piston")
     for name, count in zip(_COUNTS, counts):
@@ -90,17 +95,17 @@ def _bring_back_contacts(box: Assembly, skin: float, own: Arrays) -> None:
     m = int(first[-1])
     if first[0] != 0 or (np.diff(first) < 0).any() or m != len(np.atleast_1d(own.get("partner", 0))):
         raise Refused("contacts.first: where the rows of contacts.partner begin")
-    parts = {"partner": np.zeros(m, np.uint32), "dash": np.zeros(m), "start": contacts.start}
+    parts: Arrays = {"partner": np.zeros(m, np.uint32), "dash": np.zeros(m), "start": contacts.start}
     if contacts.slip is not None:
         parts["slip"] = np.zeros((m, 3))
-    found = {name: like(part, own.get(name), f"contacts.{name}") for name, part in parts.items()}
+    found: dict[str, Any] = {name: like(part, own.get(name), f"contacts.{name}") for name, part in parts.items()}
     within(found["partner"].astype(np.int64), "contacts.partner", 0, n - 1)
     box.contacts = contacts._replace(first=first, skin=skin, **found)
 
 
 def _walls(box: Assembly, rows: int, own: Arrays) -> Walls:
     """A table of so many walls."""
-    found = {}
+    found: dict[str, Any] = {}
     for name, values in box.walls._asdict().items():
         if values is None:
             found[name] = None

@@ -22,8 +22,8 @@ from graben.mechanics.stored import Arrays, like, listed, within
 
 # What steps change; `_step` fills the rest before it is read, and the surface follows from what is alive.
 _ARRAYS = (
-    "x", "v", "force", "tangent", "alive", "vol", "rot", "sig", "state", "hour", "node_mass", "scaled", "clock", "tip",
-    "contact_force", "mean_force", "ledger", "par",
+    "x", "v", "force", "tangent", "alive", "vol", "rot", "sig", "state", "hour", "node_mass", "scaled", "clock",
+    "tip", "contact_force", "mean_force", "ledger", "par",
 )  # fmt: skip
 _NUMBERS = (
     "work_before", "damping", "loop_seconds", "first_step", "smallest_step", "added_share", "largest_factor",

@@ -30,6 +30,7 @@ class Snapshot:
     supports: Ints
 
 
+_NOTHING = np.array(0)
 _ARRAYS = [f.name for f in fields(Snapshot) if f.name not in ("name", "time")]
 
 
@@ -46,10 +47,10 @@ def snapshot_of(stored: Arrays, own: Snapshot) -> Snapshot:
     within(parts["alive"], "alive", 0, 1)
     for name in ("faces", "supports"):
         within(parts[name], name, 0, len(own.points) - 1)
-    name, time = stored.get("name"), stored.get("time")
-    if name is None or name.dtype.kind != "U" or name.ndim or time is None or time.dtype.kind != "f" or time.ndim:
+    title, time = stored.get("name", _NOTHING), stored.get("time", _NOTHING)
+    if title.dtype.kind != "U" or time.dtype.kind != "f" or title.ndim or time.ndim:
         raise Refused("name and time of a snapshot")
-    return Snapshot(name=str(name), time=float(time), **parts)
+    return Snapshot(name=str(title), time=float(time), **parts)
 
 
 def stress_in_space(rotation: Floats, stress: Floats) -> Floats:

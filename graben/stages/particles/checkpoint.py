@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,9 @@ def arrays_of_bed(bed: Bed) -> Arrays:
 def bed_of(stored: Arrays, classes: int, names: list[str]) -> Bed:
     """Of `arrays_of_bed`. Refused where it is none of so many classes of grains, with states of these names."""
     n = len(np.atleast_1d(stored.get("radius", 0)))
-    arrays = {k: like(np.zeros((n, *more), kind), stored.get(k), k) for k, (kind, more) in _GRAINS.items()}
+    arrays: dict[str, Any] = {
+        k: like(np.zeros((n, *more), kind), stored.get(k), k) for k, (kind, more) in _GRAINS.items()
+    }
     m = len(np.atleast_1d(stored.get("push", 0)))
     arrays |= {k: like(np.zeros((m, *more), kind), stored.get(k), k) for k, (kind, more) in _CONTACTS.items()}
     within(arrays["kind"], "kind", 0, classes - 1)
@@ -50,6 +53,7 @@ def bed_of(stored: Arrays, classes: int, names: list[str]) -> Bed:
     arrays["history"] = like(np.zeros((0, len(HISTORY))), stored.get("history"), "history", rows=True)
     found = dict(zip(_SURVEY, listed(stored.get("survey"), "survey", len(_SURVEY))))
     counts = [int(c) for c in listed(stored.get("counts"), "counts", 2)]
+    numbers: dict[str, Any] = dict(zip(_NUMBERS, listed(stored.get("numbers"), "numbers", len(_NUMBERS))))
     times = listed(stored.get("times"), "times", len(names))
     if np.atleast_1d(stored.get("names", "")).tolist() != names:
         raise Refused(f"names: {', '.join(names)}")
@@ -63,5 +67,5 @@ def bed_of(stored: Arrays, classes: int, names: list[str]) -> Bed:
         state_forces={name: forces_of(own, n) for name, own in states.items()},
         steps=counts[0],
         rebuilds=counts[1],
-        **dict(zip(_NUMBERS, listed(stored.get("numbers"), "numbers", len(_NUMBERS)))),
+        **numbers,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,9 +38,7 @@ def outputs_of(scene: ParticlesScene, output: Path) -> Outputs:
 
 
 @keeps_last_good("no grain had moved yet")
-def run(
-    scene: ParticlesScene, output: Path, *, restart: bool = False, progress: Progress = silent
-) -> dict[str, Any]:
+def run(scene: ParticlesScene, output: Path, *, restart: bool = False, progress: Progress = silent) -> dict[str, Any]:
     """Make the beds of a scene, write the artifact and its VTU files.
 
     restart : go on from NAME.checkpoint.npz, which a run that was stopped left beside the output
@@ -138,8 +137,7 @@ def _beds(
                     lambda take: checkpoint.keep(lambda: state(take())), under_way,
                 )  # fmt: skip
         except BedFailed as failure:
-            last_good = failure.last_good
-            keep_by(lambda why: _write_last_good(output, last_good))
+            keep_by(partial(lambda state, why: _write_last_good(output, state), failure.last_good))
             raise
         under_way = None
         beds.append(bed)

@@ -95,7 +95,9 @@ class Checkpoint:
         BadInput : there is none, it is damaged, or it belongs to another scene, other inputs or another build
         """
         if not self.path.is_file():
-            raise BadInput(Fault(str(self.path), "restart", "", "a checkpoint, as an interrupted run leaves it", True))
+            raise BadInput(
+                Fault(str(self.path), "restart", "", "a checkpoint, as an interrupted run leaves it", True)
+            )
         arrays = read_saved(self.path, self.marks, _EXPECTED)
         for name, values in arrays.items():
             if values.dtype.kind == "f" and (np.abs(values[np.isfinite(values)]) > _LARGEST).any():
