@@ -68,6 +68,8 @@ def bring_back_assembly(box: Assembly, kind: Ints, stored: Arrays) -> None:
     bodies = {name: like(getattr(box.bodies, name), own.get(name), f"bodies.{name}") for name in _BODIES}
     if not np.array_equal(np.sort(bodies["identity"]), np.arange(n)):
         raise Refused("bodies.identity: each body once")
+    if np.abs(bodies["position"]).max() > 1e4 * max(box.width.max(), float(box.bodies.position.max())):
+        raise Refused("bodies.position: near the box")
     kind = kind[bodies["identity"]]
     law = box.law
     box.bodies = box.bodies._replace(radius=law.radius[kind], mass=law.mass[kind], kind=kind, **bodies)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from graben.mechanics.blocks.engine.model import BlockModel
@@ -11,15 +13,20 @@ from graben.mechanics.blocks.record.history import History
 from graben.mechanics.stored import Arrays, named, part_of
 
 
-def state_of(model: BlockModel, test: Loading, history: History) -> Arrays:
+def state_of(model: BlockModel, test: Loading) -> Arrays:
     """The state that was just saved, and all that the loading needs to go on."""
-    rows = history.stored(len(history.time))
     own = {name: np.array(values) for name, values in test.state().items()}
-    return named("model", snapshot.take(model)) | named("test", own) | named("history", rows)
+    return named("model", snapshot.take(model)) | named("test", own)
+
+
+def states_of(history: History) -> Callable[[], Arrays]:
+    """What gives the states that are saved up to now; they may be many, and are not copied before."""
+    states = len(history.time)
+    return lambda: named("history", history.stored(states))
 
 
 def bring_back(stored: Arrays, model: BlockModel, test: Loading, history: History) -> None:
-    """Take up a state of `state_of`. Refused where it is none of such a run."""
+    """Take up what `state_of` and `states_of` gave. Refused where it is none of such a run."""
     snapshot.bring_back(model, part_of(stored, "model"))
     test.bring_back(part_of(stored, "test"))
     history.bring_back(part_of(stored, "history"))

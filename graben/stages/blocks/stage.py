@@ -18,7 +18,7 @@ from graben.schemas.layouts.blocks import LAYOUT
 from graben.schemas.outputs import CHECKPOINT, PARTIAL, SERIES, Outputs, beside
 from graben.schemas.scenes.blocks import BlocksScene
 from graben.stages.blocks.biaxial import BiaxialReport, biaxial
-from graben.stages.blocks.checkpoint import bring_back, state_of
+from graben.stages.blocks.checkpoint import bring_back, state_of, states_of
 from graben.stages.blocks.geometry import Ground, lay_out
 from graben.stages.blocks.model import block_model
 from graben.stages.blocks.output import write_vtk
@@ -88,7 +88,7 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
                 if not test.failed:
                     _check_ledger(history, scene.numerics.energy_limit, model.steps_done)
                 sound = len(history.time)
-                checkpoint.keep(lambda: state_of(model, test, history))
+                checkpoint.keep(lambda: state_of(model, test), later=states_of(history))
             progress(moment.fraction, moment.words)
         arrays = _arrays(model, history, report)
         headline = report.headline(arrays) | ground.mended

@@ -72,6 +72,7 @@ class Checkpoint:
     marks: Mapping[str, str]
     record: Record
     _last: Arrays | None = None
+    _later: Callable[[], Arrays] = dict
     _taken: _Pace = field(default_factory=_Pace)
     _written: _Pace = field(default_factory=lambda: _Pace(time.monotonic()))
 
@@ -116,15 +117,15 @@ class Checkpoint:
             expected = f"a checkpoint of this model ({error})"
             raise BadInput(Fault(str(self.path), "restart", "", expected, True)) from error
 
-    def keep(self, take: Callable[[], Arrays], *, at_once: bool = False) -> None:
+    def keep(self, take: Callable[[], Arrays], *, at_once: bool = False, later: Callable[[], Arrays] = dict) -> None:
         """The run stands on a state that it can go on from; take copies what later steps change.
 
-        at_once : put it on disk now
+        at_once : put it on disk now; later : gives the rest, which no step changes, when it is written
         """
         write = at_once or self._written.due(EVERY_S)
         if write or self._taken.due():
             with self._taken.timed():
-                self._last = take()
+                self._last, self._later = take(), later
         if write:
             self.write()
 
@@ -134,7 +135,7 @@ class Checkpoint:
             return False
         with self._written.timed():
             spent = {_SPENT: np.array(self.record.spent())}
-            return write_saved(self.path, self.marks, {**self._last, **spent})
+            return write_saved(self.path, self.marks, {**self._last, **self._later(), **spent})
 
     @contextmanager
     def guarding(self) -> Iterator[None]:
