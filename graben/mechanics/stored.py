@@ -31,19 +31,17 @@ def listed(values: np.ndarray | None, name: str, count: int | None = None) -> li
     return found
 
 
-def like(
-    own: np.ndarray, found: np.ndarray | None, name: str, *, rows: bool = False, nan: bool = False
-) -> np.ndarray:
-    """An array of the kind and shape of another; Refused where it is none.
+def like(own: np.ndarray, found: np.ndarray | None, name: str, *, rows: bool = False) -> np.ndarray:
+    """An array of the kind and shape of another, of finite numbers; Refused where it is none.
 
-    rows : their number may be another; nan : may be among its numbers
+    rows : their number may be another
     """
     if found is None or found.dtype != own.dtype or found.ndim != own.ndim:
         raise Refused(f"{name}: {own.ndim} dimensions of {own.dtype}")
     if found.shape[rows:] != own.shape[rows:]:
         raise Refused(f"{name}: shape {own.shape}")
-    if not nan and found.dtype.kind == "f" and np.isnan(found).any():
-        raise Refused(f"{name}: numbers")
+    if found.dtype.kind == "f" and not np.isfinite(found).all():
+        raise Refused(f"{name}: finite numbers")
     return np.ascontiguousarray(found)
 
 

@@ -44,14 +44,16 @@ def arrays_of_march(run: March) -> Arrays:
     return {k: np.asarray(v) for k, v in stored.items()} | named("state", arrays_of_state(run.state)) | before
 
 
-def march_of(stored: Arrays, body: Body) -> March:
-    """Of `arrays_of_march`. Refused where it is none of this body."""
+def march_of(stored: Arrays, body: Body, end: float) -> March:
+    """Of `arrays_of_march`. Refused where it is none of this body, from time 0 towards an end, s."""
     numbers = dict(zip(_NUMBERS, listed(stored.get("numbers"), "numbers", len(_NUMBERS))))
     counts = [int(n) for n in listed(stored.get("counts"), "counts", len(_COUNTS) + len(_FLAGS))]
     sizes = [int(n) for n in listed(stored.get("residual_count"), "residual_count")]
     if min(counts) < 0 or min(sizes, default=1) < 1 or min(numbers["length"], numbers["last_length"]) < 0.0:
         raise Refused("counts and lengths of steps that are not negative")
     residuals = np.array(listed(stored.get("residual"), "residual", sum(sizes)))
+    if not numbers["begin"] == 0.0 <= numbers["time"] <= end or (numbers["time"] > 0.0) != bool(sizes):
+        raise Refused(f"numbers: a time from 0 to {end:g} s")
     reason, before = stored.get("reason"), part_of(stored, "before")
     if reason is None or reason.dtype.kind != "U" or reason.ndim:
         raise Refused("reason: a text")

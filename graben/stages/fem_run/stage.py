@@ -188,9 +188,9 @@ class Analysis:
     def bring_back(self, stored: Arrays) -> None:
         """Take up a state of `stored`. Refused where it is none of this problem."""
         body, loaded = self.problem.body, part_of(stored, "loaded")
-        self.settled = march_of(part_of(stored, "settled"), body)
+        self.settled = march_of(part_of(stored, "settled"), body, 1.0)
         if loaded:
-            self.loaded = march_of(loaded, body)
+            self.loaded = march_of(loaded, body, self.scene.stepping.end)
             self._begin_loads()
             self.curve.bring_back(part_of(stored, "curve"), self.loaded.state.displacement)
             self.saved.bring_back(part_of(stored, "saved"), body, self.loaded)

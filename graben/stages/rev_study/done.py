@@ -94,7 +94,7 @@ def _chunk(stored: Arrays, samples: int) -> list[Sample]:
         raise Refused("states: one at least of each sample")
     rows = np.zeros((sum(states), 4))
     ends = np.cumsum(states)[:-1]
-    stress, strain = (np.split(like(rows, stored.get(k), k, nan=True), ends) for k in ("stress", "strain"))
+    stress, strain = (np.split(like(rows, stored.get(k), k), ends) for k in ("stress", "strain"))
     area = listed(stored.get("area"), "area", samples)
     blocks = [int(n) for n in listed(stored.get("blocks"), "blocks", samples)]
     return list(zip(stress, strain, area, blocks))
