@@ -99,7 +99,7 @@ def fit(
     measured = [curve_of(str(name), *_arrays(str(name), c), reading_of(model)) for name, c in named.items()]
     prepared = prepare_curves(model, measured)
     with workers_of(model.search, model.workers, prepared.problem.plan.particles, None) as workers:
-        found = fit_curves(prepared, State(None, "", workers), progress or silent)
+        found = fit_curves(prepared, State(None, workers), progress or silent)
     rows = {c.name: len(c.stress) for c in measured}
     headline = {k: v for k, v in found.headline.items() if k != "warnings"}
     stress, strain = (

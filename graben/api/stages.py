@@ -25,11 +25,11 @@ Progress = Callable[[float, str], None]
 # Kind of scene -> its stage, and what that takes beside the scene.
 _STAGES: dict[str, tuple[str, tuple[str, ...]]] = {
     "blocks": ("dem_run", ("restart",)),
-    "particles": ("dem_run", ()),
-    "rev-study": ("rev_study", ("inputs", "cluster")),
+    "particles": ("dem_run", ("restart",)),
+    "rev-study": ("rev_study", ("inputs", "cluster", "restart")),
     "calibrate": ("calibrate", ("curves", "validate", "compare", "cluster", "restart")),
-    "fem": ("fem_run", ("material",)),
-    "scratch": ("scratch", ("material",)),
+    "fem": ("fem_run", ("material", "restart")),
+    "scratch": ("scratch", ("material", "restart")),
     "wear": ("wear_estimate", ("bed", "scratch")),
 }
 
@@ -105,7 +105,7 @@ def run(
         only, scenes of rival laws
     bed, scratch : kind "wear": a run of grains; runs of scratches by class of grain
     cluster : kinds "rev-study" and "calibrate": address of a Dask scheduler
-    restart : kinds "blocks" and "calibrate": go on where a stopped run with the same output left off
+    restart : all kinds but "wear": go on where a stopped run with the same output left off
     overwrite : replace what an earlier run wrote under the same name
     progress : called with the fraction done, 0 to 1, and a few words
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import click
 
 from graben.cli.budget import budget_option, within
-from graben.cli.options import Session, Tool, scene_argument, set_option, stage_options
+from graben.cli.options import Session, Tool, restart_option, scene_argument, set_option, stage_options
 
 
 @click.command("dem-run", cls=Tool)
 @scene_argument
-@click.option("--restart", is_flag=True, help="Go on from the checkpoint that a stopped run of blocks left.")
+@restart_option
 @budget_option
 @set_option
 @stage_options

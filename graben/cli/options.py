@@ -262,6 +262,13 @@ def cluster_option(function: Callable[..., None]) -> Callable[..., None]:
     )(function)
 
 
+def restart_option(function: Callable[..., None]) -> Callable[..., None]:
+    """--restart; the command receives `restart`."""
+    return click.option(
+        "--restart", is_flag=True, help="Go on where a run with the same output was stopped (NAME.checkpoint.npz)."
+    )(function)
+
+
 def set_option(function: Callable[..., None]) -> Callable[..., None]:
     """--set KEY=VALUE, repeatable; the command receives `overrides`, a tuple of strings."""
     return click.option(

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from graben.cli.budget import budget_option, options_of, within
-from graben.cli.options import FILE, Session, Tool, cluster_option, set_option, stage_options
+from graben.cli.options import FILE, Session, Tool, cluster_option, restart_option, set_option, stage_options
 
 
 @click.command("rev-study", cls=Tool)
@@ -27,6 +27,7 @@ from graben.cli.options import FILE, Session, Tool, cluster_option, set_option, 
     help='Scene of kind "calibrate": fit its law to every sample; the parameters must settle.',
 )
 @click.option("--processes", type=int, help="Processes that share the work (0: one per core).")
+@restart_option
 @budget_option
 @cluster_option
 @set_option
@@ -39,6 +40,7 @@ def main(
     grid: int | None,
     calibrate: Path | None,
     processes: int | None,
+    restart: bool,
     budget: float | None,
     cluster: str | None,
     overrides: tuple[str, ...],
@@ -68,5 +70,7 @@ def main(
     more, told = within(session, budget, scene or study, command, inputs, short)
     study = load_scene(study, "rev-study", more[len(short) :])
     with session.progress() as progress:
-        headline = rev_study.run(inputs, study, output, cluster=cluster, overwrite=overwrite, progress=progress)
+        headline = rev_study.run(
+            inputs, study, output, cluster=cluster, overwrite=overwrite, restart=restart, progress=progress
+        )
     session.report(told(headline))

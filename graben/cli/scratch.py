@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from graben.cli.budget import budget_option, options_of, within
-from graben.cli.options import FILE, Session, Tool, scene_argument, set_option, stage_options
+from graben.cli.options import FILE, Session, Tool, restart_option, scene_argument, set_option, stage_options
 
 
 @click.command("scratch", cls=Tool)
@@ -17,6 +17,7 @@ from graben.cli.options import FILE, Session, Tool, scene_argument, set_option, 
     type=FILE,
     help="Use this law and its parameters instead of the scene's: NAME.material.toml or calibrate's artifact.",
 )
+@restart_option
 @budget_option
 @set_option
 @stage_options
@@ -24,6 +25,7 @@ def main(
     session: Session,
     scene: Path,
     material: Path | None,
+    restart: bool,
     budget: float | None,
     overrides: tuple[str, ...],
     output: Path,
@@ -41,6 +43,12 @@ def main(
     overrides, told = within(session, budget, scene, command, [], overrides)
     with session.progress() as progress:
         headline = scratch.run(
-            scene, output, material=material, overrides=overrides, overwrite=overwrite, progress=progress
+            scene,
+            output,
+            material=material,
+            overrides=overrides,
+            overwrite=overwrite,
+            restart=restart,
+            progress=progress,
         )
     session.report(told(headline))

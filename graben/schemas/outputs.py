@@ -87,7 +87,7 @@ class Outputs:
         for path in paths:
             # What a restart reads is judged, and named, where it is read.
             if path not in taken and not (restart and path in kept and path.is_file()):
-                faults += self._faults_of(path, overwrite, path in kept)
+                faults += self._faults_of(path, overwrite or (restart and path in kept), path in kept)
         faults += self._twin() if not faults else []
         faults += [f for p in paths for f in _misplaced(p)] if not faults else []
         faults += [f for p in (self.main, *self.others) for f in _among_fields(p)] if not faults else []

@@ -64,12 +64,22 @@ class Record:
         self.warnings = list(dict.fromkeys([*texts, *self.warnings]))
         return self.warnings
 
+    def spent(self) -> tuple[float, float]:
+        """Wall and CPU time up to now, s."""
+        return time.perf_counter() - self._wall, _cpu_seconds() - self._cpu
+
+    def count(self, wall: float, cpu: float) -> None:
+        """Add what the run took before it was stopped, s."""
+        self._wall -= wall
+        self._cpu -= cpu
+
     def closed_cost(self) -> dict[str, Any]:
         """The cost record with wall time, CPU time and peak memory up to now."""
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        wall, cpu = self.spent()
         return {
-            "wall_s": time.perf_counter() - self._wall,
-            "cpu_s": _cpu_seconds() - self._cpu,
+            "wall_s": wall,
+            "cpu_s": cpu,
             "peak_memory_bytes": int(peak) * (1 if sys.platform == "darwin" else 1024),
             **self.cost,
         }

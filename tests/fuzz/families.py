@@ -62,7 +62,7 @@ def checkpoints(rng: random.Random, stock: Path, folder: Path) -> None:
     else:
         kept.write_bytes(damaged_bytes(rng, kept.read_bytes()))
     kind, output = kept.name.split(".")[0], folder / (kept.name.split(".")[0] + ".nc")
-    command = {"blocks": "dem-run", "calibrate": "calibrate"}[kind]
+    command = {"blocks": "dem-run", "particles": "dem-run", "calibrate": "calibrate"}[kind]
     ran = call(command, folder / f"{kind}.toml", "-o", output, "--restart", "--json", "-q", seconds=5.0)
     # A digest that fits vouches for the numbers: only shapes and ranges can be seen.
     if not edited:

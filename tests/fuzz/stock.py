@@ -98,11 +98,13 @@ def small_text(scene: Path, overrides: list[str]) -> str:
 
 
 def _make_restart(folder: Path, straight: Path, scenes: Path) -> None:
-    """What runs of blocks and of calibrate leave when they are interrupted halfway, and straight runs of them."""
+    """What runs of blocks, of grains and of calibrate leave when they are interrupted halfway, and straight ones."""
     from graben.stages.calibrate import stage as calibrate
     from graben.stages.dem_run import stage as dem_run
 
-    for kind, stage, end in (("blocks", dem_run, "checkpoint"), ("calibrate", calibrate, "state")):
+    for kind, stage, end in (
+        ("blocks", dem_run, "checkpoint"), ("particles", dem_run, "checkpoint"), ("calibrate", calibrate, "state"),
+    ):  # fmt: skip
         scene, kept = folder / f"{kind}.toml", folder / f"{kind}.{end}.npz"
         shutil.copy(scenes / f"{kind}.toml", scene)
         stage.run(scene, straight / f"{kind}.nc")

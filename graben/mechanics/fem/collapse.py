@@ -10,8 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from graben.errors import Refused
+from graben.mechanics.stored import Arrays, listed
+
 # Viscous stress below this multiple of the rise of the pressure in the relaxation time is that of elastic strain.
 _ELASTIC = 5.0
+_COLUMNS = ("time", "pressure", "carried", "settlement", "iterations")
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,20 @@ class LoadCurve:
         self.settlement.append(float(self._load.settling @ (displacement - self._start)))
         self.iterations.append(iterations)
         self._now = displacement
+
+    def stored(self) -> Arrays:
+        """The curve as arrays."""
+        return {name: np.array(getattr(self, name)) for name in _COLUMNS}
+
+    def bring_back(self, stored: Arrays, now: np.ndarray) -> None:
+        """Take up a curve of `stored`; now: displacement (2 n,) of its end. Refused where it is none."""
+        length = np.size(stored.get("time", ()))
+        columns = {name: listed(stored.get(name), f"curve.{name}", length) for name in _COLUMNS}
+        if not length:
+            raise Refused("curve.time: one state at least")
+        for name, values in columns.items():
+            setattr(self, name, [int(v) for v in values] if name == "iterations" else values)
+        self._now = now
 
     def compliance_ratio(self) -> float:
         """Settlement per pressure of the last step over that of the first; grows without bound at a collapse."""

@@ -55,8 +55,11 @@ class March:
     Attributes
     ----------
     time, state, force, drag : the last equilibrium, its internal and its viscous forces
+    begin : load time of the first state
     before : the state before the last step; None before the first
+    length, last_length : of the next step, 0 before the first, and of the last one
     complete : whether the end time was reached
+    ended : whether the last equilibrium is no equilibrium any more (an overload)
     reason : why the last attempt failed (empty when complete)
     iterations, residuals : per accepted step: factorisations and their residuals
     rejected : number of attempts that failed
@@ -68,8 +71,12 @@ class March:
     state: State
     force: np.ndarray
     drag: np.ndarray
+    begin: float
     before: State | None = None
+    length: float = 0.0
+    last_length: float = 0.0
     complete: bool = False
+    ended: bool = False
     reason: str = ""
     iterations: list[int] = field(default_factory=list)
     residuals: list[tuple[float, ...]] = field(default_factory=list)
@@ -91,7 +98,7 @@ def at_rest(body: Body, state: State, time: float) -> March:
     The forces that balance the stresses are the internal ones: no work is missed at the start.
     """
     force = body.respond(state, np.zeros(body.pattern.size), False).force
-    return March(time, state, force, np.zeros_like(force))
+    return March(time, state, force, np.zeros_like(force), time)
 
 
 def march(
@@ -127,6 +134,7 @@ def advance(
     """Follow the load history to `end`, s: each equilibrium is given when `run` stands on it.
 
     At last `run` is complete, or a step of the smallest length failed: the load of its time is then the last carried.
+    From a copy of `run`, made at any equilibrium, the march goes on bitwise.
 
     Parameters
     ----------
@@ -138,27 +146,27 @@ def advance(
     overload : makes the first equilibrium that is one the last, not complete. A step of more than a tenth of the
         march is halved first
     """
-    begin, held = run.time, run.state.displacement[body.fixed].copy()
+    begin, held = run.begin, run.state.displacement[body.fixed].copy()
     supports = prescribed if prescribed is not None else (lambda _t: held)
     stops = np.array([end]) if save_times is None else np.append(np.asarray(save_times, dtype=float), end)
     stops = np.unique(stops[(stops > begin) & (stops <= end)])
-    load = external(begin)
-    length, last_length = steps.first, 0.0
+    load = external(run.time)
+    run.length = run.length or steps.first
     elastic = None
     if relaxation > 0:
         elastic = body.respond(body.untouched(), np.zeros(body.pattern.size), True).values
         elastic_matrix = body.pattern.matrix(elastic)
-    last_increment: np.ndarray | None = None
-    while run.time < end:
+    while run.time < end and not run.ended:
         stop = float(stops[np.searchsorted(stops, run.time, side="right")])
-        target = run.time + length
+        length, target = run.length, run.time + run.length
         # A remainder shorter than a tenth of a step is taken along.
         if target > stop - 0.1 * length:
             target = stop
         taken = target - run.time
         guess = None
-        if steps.extrapolate and last_increment is not None:
-            guess = last_increment * (taken / last_length)
+        if steps.extrapolate and run.before is not None:
+            last_increment = run.state.displacement - run.before.displacement
+            guess = last_increment * (taken / run.last_length)
         new_load = external(target)
         resist = None if elastic is None else Drag(elastic_matrix, elastic, relaxation / taken)
         step = equilibrate(body, run.state, new_load, supports(target), newton, guess, resist)
@@ -172,25 +180,25 @@ def advance(
         if not step.converged or (ended and steps.resolve and taken > _COARSE * (target - begin)):
             run.rejected += 1
             run.reason = ended or step.reason
-            length = 0.5 * taken if run.iterations or taken > steps.smallest else _DOWN * taken
-            if length < steps.least_after(run.time - begin):
+            run.length = 0.5 * taken if run.iterations or taken > steps.smallest else _DOWN * taken
+            if run.length < steps.least_after(run.time - begin):
                 return
             continue
         _book(run, body, step, increment, load, new_load)
-        last_increment, last_length = increment, taken
         run.before = run.state
         run.time, run.state, run.force, load = target, step.state, step.force, new_load
         run.iterations.append(step.iterations)
         run.residuals.append(step.residuals)
-        yield step
+        run.last_length, run.ended = taken, bool(ended)
         if ended:
             run.reason = ended
-            return
-        if step.iterations <= steps.easy:
-            length = min(1.5 * max(length, taken), steps.largest)
+        elif step.iterations <= steps.easy:
+            run.length = min(1.5 * max(length, taken), steps.largest)
         elif step.iterations > steps.hard:
-            length = max(taken * 2 / 3, min(taken, steps.smallest))
-    run.complete, run.reason = True, ""
+            run.length = max(taken * 2 / 3, min(taken, steps.smallest))
+        yield step
+    if not run.ended:
+        run.complete, run.reason = True, ""
 
 
 def _book(

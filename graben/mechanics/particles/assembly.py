@@ -149,9 +149,9 @@ class Assembly:
         if self.period is not None:
             low[:2], high[:2] = 0.0, self.period
         reach = high - low
-        if reach[2] > 1e4 * cutoff * x.shape[0] ** (1 / 3):
+        if np.any(reach > 1e4 * cutoff * x.shape[0] ** (1 / 3) + np.append(self.width, 0.0)):
             raise NumericsFailed(
-                f"a particle flew {reach[2]:.3g} m away", step=self.steps, advice="lower the time step safety"
+                f"a particle flew {reach.max():.3g} m away", step=self.steps, advice="lower the time step safety"
             )
         counts = grid_shape(reach, cutoff)
         order, start = cell_order(x, low, np.where(reach > 0.0, reach, cutoff) / counts, counts)

@@ -6,62 +6,33 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from graben.errors import NumericsFailed, Refused
 from graben.mechanics.particles.assembly import Assembly, ContactForces, Survey
 from graben.mechanics.particles.insertion import insert
 from graben.mechanics.particles.law import LinearLaw
+from graben.mechanics.particles.recipe import BedRecipe, check_recipe, column_height, numbers
+from graben.mechanics.particles.records import Floats, Ints
+from graben.mechanics.particles.stored import (
+    arrays_of_assembly,
+    arrays_of_forces,
+    bring_back_assembly,
+    forces_of,
+)
+from graben.mechanics.stored import Arrays, like, listed, named, part_of
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
-# solid fraction by which a nominal depth is turned into a number of grains
-NOMINAL_FRACTION = 0.6
 # the time step is shortened where it passes this part of the stable one, bounded from the contacts that exist
 STEP_LIMIT = 0.9
 # part of the load by which what floor and walls carry may miss it at rest
 CARRIED = 0.02
 # unbalanced force ratio below which a bed without friction between grains counts as settled
 CREEPING = 1.0
+PHASES = ("settled", "shaking", "shaken", "pressed", "quenched")
 HISTORY = (
     "time", "kinetic", "elastic", "potential", "dashpots", "friction", "drag", "floor_work", "piston_work", "total",
     "unbalanced", "floor_push", "piston_push", "piston_height", "floor_contacts",
     "wall_lift",
 )  # fmt: skip
-
-
-@dataclass(frozen=True)
-class BedRecipe:
-    """What is poured, and what is done to it.
-
-    share : (c,) volume share of each class, theta_i of H (8.9); sums to 1
-    width : (2,) m; depth : m, of the bed before pressing (nominal: solid fraction 0.6)
-    loose_fraction : solid fraction of the inserted column
-    gravity : m/s2; pressure : Pa on top
-    shakes : cycles of the floor, z = amplitude sin(2 pi frequency t), amplitude m, frequency Hz
-    rest : kinetic energy over (weight x smallest radius) at which a bed is at rest
-    balance : unbalanced force ratio at which the quenched bed is at rest; ten times as much ends the phases before it
-        (settling without friction between grains: CREEPING)
-    energy_limit : allowed relative error of the energy balance
-    """
-
-    share: Floats
-    width: tuple[float, float]
-    depth: float
-    pressure: float
-    gravity: float = 9.81
-    periodic: bool = True
-    loose_fraction: float = 0.25
-    shakes: int = 0
-    shake_amplitude: float = 0.0
-    shake_frequency: float = 0.0
-    safety: float = 0.4
-    rest: float = 1e-3
-    balance: float = 1e-3
-    energy_limit: float = 0.05
-    ramp: float = 5.0  # half periods of the slowest mode over which the pressure rises
-    max_steps: int = 2_000_000
 
 
 @dataclass
@@ -102,37 +73,6 @@ class Bed:
         return np.bincount(self.kind[self.floor_force > 0.0], minlength=classes).astype(np.int64)
 
 
-def numbers(law: LinearLaw, recipe: BedRecipe) -> Ints:
-    """Particles of each class (c,) for the nominal depth. Raises Refused for an empty bed."""
-    share = np.asarray(recipe.share, dtype=np.float64)
-    if share.shape != law.radius.shape or np.any(share < 0.0) or abs(share.sum() - 1.0) > 1e-6:
-        raise Refused(f"share: expected {law.radius.size} shares >= 0 with sum 1, found {share.tolist()}")
-    solid = NOMINAL_FRACTION * recipe.width[0] * recipe.width[1] * recipe.depth
-    count = np.rint(share * solid / (4.0 / 3.0 * np.pi * law.radius**3)).astype(np.int64)
-    if count.sum() == 0 or np.any((count == 0) & (share > 0.0)):
-        raise Refused(f"bed is empty: the box holds {count.tolist()} particles per class; make it larger")
-    return count
-
-
-def check_recipe(law: LinearLaw, recipe: BedRecipe) -> None:
-    """Raise Refused for a bed that cannot be made; nothing is placed."""
-    if not recipe.pressure > 0.0 or not recipe.gravity > 0.0:
-        raise Refused(f"expected pressure > 0 and gravity > 0, found {recipe.pressure}, {recipe.gravity}")
-    if recipe.shakes > 0 and not (recipe.shake_amplitude > 0.0 and recipe.shake_frequency > 0.0):
-        raise Refused("shaking: expected amplitude > 0 and frequency > 0")
-    if not law.rubs and not law.damping > 0.0:
-        raise Refused("contact.damping: expected a positive value where no friction acts; nothing else takes energy")
-    numbers(law, recipe)
-    largest = 2.0 * float(law.radius.max())
-    if not recipe.periodic and min(recipe.width) <= largest:
-        raise Refused(f"box.width: expected more than one grain, {largest:.6g} m, found {min(recipe.width):.6g} m")
-
-
-def column_height(law: LinearLaw, recipe: BedRecipe, solid: float) -> float:
-    """Height of the column that is poured, m, from the volume of its grains, m3."""
-    return max(solid / (recipe.loose_fraction * recipe.width[0] * recipe.width[1]), 4.0 * float(law.radius.max()))
-
-
 @dataclass(frozen=True)
 class Snapshot:
     """Where all grains were, in the order of insertion: time s, position and velocity (n, 3), radius, kind (n,)."""
@@ -152,11 +92,28 @@ class BedFailed(NumericsFailed):
         self.last_good = last_good
 
 
+_NUMBERS = ("reference", "energy_scale", "energy_error", "over", "shaken_from", "pace")
+
+
 class _Run:
     """One bed under way: the assembly, its history and its checks."""
 
-    def __init__(self, law: LinearLaw, recipe: BedRecipe, seed: int, progress: Callable[[float, str], None]) -> None:
-        self.recipe, self.progress = recipe, progress
+    def __init__(
+        self,
+        law: LinearLaw,
+        recipe: BedRecipe,
+        seed: int,
+        progress: Callable[[float, str], None],
+        keep: Callable[[Callable[[], Arrays]], None] = lambda take: None,
+    ) -> None:
+        self.recipe, self.progress, self.keep = recipe, progress, keep
+        self.place = -1  # of the phase in PHASES
+        self.calm = self.chunks = (
+            0  # of the phase: samples in a row at which nothing was missing, and chunks of steps
+        )
+        self.shaken_from = 0.0  # s
+        self.pace = 0.0  # half period of the slowest mode, s
+        self.carried = (0.0, 0.0)  # by floor and walls before pressing, N
         count = numbers(law, recipe)
         order = np.argsort(-law.radius, kind="stable")
         kind = np.repeat(order, count[order])
@@ -218,18 +175,28 @@ class _Run:
         self.last_good = self.snapshot()
         return s
 
+    def phase(self, name: str, begin: Callable[[], None], go: Callable[[], object]) -> None:
+        """One phase: one that is over already is passed over, and one under way is not begun again."""
+        place = PHASES.index(name)
+        if place > self.place:
+            begin()
+            self.place, self.calm, self.chunks = place, 0, 0
+        if place == self.place:
+            go()
+
     def until(
         self, phase: str, missing: Callable[[Survey], str], share: tuple[float, float], chunk: int = 200
     ) -> Survey:
         """Run in chunks until nothing is missing, in two samples in a row. share: of the progress of the run."""
-        calm = chunks = 0
-        while calm < 2:
+        while self.calm < 2:
             self.box.advance(chunk)
             s = self.sample()
             lacking = missing(s)
-            calm = 0 if lacking else calm + 1
-            chunks += 1
-            fraction = share[0] + (share[1] - share[0]) * (1.0 - np.exp(-chunks / 60.0))  # its end is not known
+            self.calm = 0 if lacking else self.calm + 1
+            self.chunks += 1
+            fraction = share[0] + (share[1] - share[0]) * (1.0 - np.exp(-self.chunks / 60.0))  # its end is not known
+            if self.calm < 2:
+                self.keep(self.stored)
             self.progress(fraction, f"{phase}: unbalanced force {s.unbalanced:.2e}, kinetic {s.kinetic:.2e} J")
             if lacking and self.box.steps > self.recipe.max_steps:
                 raise NumericsFailed(
@@ -240,6 +207,56 @@ class _Run:
         self.times[phase] = self.box.time
         self.forces[phase] = self.box.contact_forces()
         return s
+
+    def shake(self) -> None:
+        """All cycles of the floor that are left."""
+        box, recipe = self.box, self.recipe
+        length = recipe.shakes / recipe.shake_frequency
+        # the step may shorten on the way
+        while (left := round((self.shaken_from + length - box.time) / box.dt)) > 0:
+            box.advance(min(500, left))
+            self.sample()
+            self.keep(self.stored)
+            done = (box.time - self.shaken_from) / length
+            self.progress(0.5 + 0.1 * done, f"shaking: {done * recipe.shakes:.0f} cycles")
+        box.shake_floor(0.0, 0.0)
+
+    def stored(self) -> Arrays:
+        """The state of the run; nothing changes what was at the ends of phases."""
+        numbers = [getattr(self, name) for name in _NUMBERS]
+        found = {
+            "place": np.array([self.place, self.calm, self.chunks]),
+            "numbers": np.array([*numbers, *self.carried]),
+            "rows": np.array(self.rows),
+            "times": np.array(list(self.times.values())),
+        }
+        for name, position in self.states.items():
+            found |= named(f"state.{name}", {"position": position, **arrays_of_forces(self.forces[name])})
+        return found | named("box", arrays_of_assembly(self.box))
+
+    def bring_back(self, stored: Arrays) -> None:
+        """Take up a state of `stored`. Refused where it is none of this bed."""
+        self.place, self.calm, self.chunks = map(int, listed(stored.get("place"), "place", 3))
+        phases = [name for name in PHASES if self.recipe.shakes > 0 or name not in ("shaking", "shaken")]
+        if not (0 <= self.place < len(PHASES) and PHASES[self.place] in phases and 0 <= self.calm < 2):
+            raise Refused("place: a phase of the bed")
+        found = listed(stored.get("numbers"), "numbers", len(_NUMBERS) + 2)
+        for name, value in zip(_NUMBERS, found):
+            setattr(self, name, value)
+        self.carried = (found[-2], found[-1])
+        if not self.energy_scale > 0.0 or (self.place >= PHASES.index("pressed") and not self.pace > 0.0):
+            raise Refused("numbers: positive energy and pace")
+        rows = like(np.zeros((0, len(HISTORY))), stored.get("rows"), "rows", rows=True)
+        self.rows = rows.tolist()
+        over = ["inserted", *(name for name in PHASES[: self.place] if name in phases and name != "shaking")]
+        times = listed(stored.get("times"), "times", len(over))
+        grains = self.states["inserted"]
+        for name, time in zip(over, times):
+            own = part_of(stored, f"state.{name}")
+            self.states[name] = like(grains, own.get("position"), f"state.{name}.position")
+            self.times[name], self.forces[name] = time, forces_of(own, len(grains))
+        bring_back_assembly(self.box, self.insertion_kind, part_of(stored, "box"))
+        self.last_good = self.snapshot()
 
     def unrest(self, s: Survey, balance: float) -> str:
         """What keeps the bed from rest: motion, forces on the grains, or those of floor, walls and piston; or ""."""
@@ -266,14 +283,21 @@ def make_bed(
     recipe: BedRecipe,
     seed: int,
     progress: Callable[[float, str], None] = lambda fraction, message: None,
+    keep: Callable[[Callable[[], Arrays]], None] = lambda take: None,
+    stored: Arrays | None = None,
 ) -> Bed:
     """Pour, settle, shake (if asked), press and quench one bed.
 
     Returns the bed at rest; raises Refused for an impossible recipe and NumericsFailed when the run blows up, loses
     energy balance, or does not come to rest within recipe.max_steps (as BedFailed, with the last good state).
+
+    keep : told of each state that a bed can go on from bitwise, and how to take it
+    stored : such a state, to go on from; Refused where it is none of this bed
     """
     check_recipe(law, recipe)
-    run = _Run(law, recipe, seed, progress)
+    run = _Run(law, recipe, seed, progress, keep)
+    if stored is not None:
+        run.bring_back(stored)
     try:
         return _finish(run, law, recipe)
     except NumericsFailed as failure:
@@ -283,39 +307,18 @@ def make_bed(
 def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
     """All phases after insertion."""
     box = run.box
-    small = float(law.radius.min())
-    mean_k = float(np.mean(np.diag(law.pairs.kn)))
-    weight = run.mass * recipe.gravity
+    weight, push = run.mass * recipe.gravity, recipe.pressure * run.area
 
     # without friction between grains a bed creeps on for long; pressing and quenching bring it to rest
     looser = 10.0 * recipe.balance if law.friction > 0.0 else CREEPING
 
-    def resting(s: Survey) -> str:
-        return run.unrest(s, looser)
+    def rest(phase: str, share: tuple[float, float]) -> None:
+        s = run.until(phase, lambda s: run.unrest(s, looser), share)
+        run.carried = (s.floor_push, s.wall_lift)
 
-    at_rest = run.until("settled", resting, (0.0, 0.5))
-    if recipe.shakes > 0:
-        begun, length = box.time, recipe.shakes / recipe.shake_frequency
+    def begin_shaking() -> None:
+        run.shaken_from = box.time
         box.shake_floor(recipe.shake_amplitude, recipe.shake_frequency)
-        while (left := round((begun + length - box.time) / box.dt)) > 0:  # the step may shorten on the way
-            box.advance(min(500, left))
-            run.sample()
-            done = (box.time - begun) / length
-            run.progress(0.5 + 0.1 * done, f"shaking: {done * recipe.shakes:.0f} cycles")
-        box.shake_floor(0.0, 0.0)
-        at_rest = run.until("shaken", resting, (0.6, 0.7))
-
-    # the plate is light, so that it follows the bed, and its dashpot is critical on the bed's stiffness
-    top = float(np.max(box.bodies.position[:, 2] + box.bodies.radius))
-    push = recipe.pressure * run.area
-    cell = (2.0 * small) ** 2
-    footing = min(run.area, len(run.insertion_kind) * cell)  # few grains are fewer than a layer
-    layer = footing / cell * float(law.mass.min())
-    plate_mass = max(0.1 * run.mass, 0.3 * layer)  # a lighter one would need a shorter time step
-    bed_stiffness = mean_k * footing / (2.0 * small) / top  # of a plate on a column of springs
-    damping = 2.0 * np.sqrt(bed_stiffness * plate_mass)
-    pace = np.pi * np.sqrt((run.mass / 3.0 + plate_mass) / bed_stiffness)  # half period of the slowest mode, s
-    box.set_piston(top, plate_mass, damping, push, push / (recipe.ramp * pace))
 
     def pressed(s: Survey) -> str:
         if box.piston_push < push or not abs(s.piston_push - push) < 0.01 * push:
@@ -324,10 +327,20 @@ def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
             return f"unbalanced force {s.unbalanced:.3g} of the mean contact force (limit {10.0 * recipe.balance:g})"
         return ""
 
-    run.until("pressed", pressed, (0.7, 0.9))
+    def nothing() -> None:
+        return None
+
+    run.phase("settled", nothing, lambda: rest("settled", (0.0, 0.5)))
+    if recipe.shakes > 0:
+        run.phase("shaking", begin_shaking, run.shake)
+        run.phase("shaken", nothing, lambda: rest("shaken", (0.6, 0.7)))
+    run.phase("pressed", lambda: _put_plate(run, law, recipe), lambda: run.until("pressed", pressed, (0.7, 0.9)))
     # quench: drag that damps the slowest mode critically, until forces balance
-    box.brake(2.0 * np.pi / (2.0 * pace))
-    run.until("quenched", lambda s: run.unrest(s, recipe.balance), (0.9, 1.0))
+    run.phase(
+        "quenched",
+        lambda: box.brake(2.0 * np.pi / (2.0 * run.pace)),
+        lambda: run.until("quenched", lambda s: run.unrest(s, recipe.balance), (0.9, 1.0)),
+    )
 
     s, floor_force, coordination = box.survey()
     pair, normal, contact_push = box.touching()
@@ -350,11 +363,27 @@ def _finish(run: _Run, law: LinearLaw, recipe: BedRecipe) -> Bed:
         area=run.area,
         piston_height=height,
         solid_fraction=run.volume / (run.area * height),
-        floor_share_of_weight=at_rest.floor_push / weight,
-        wall_share_of_weight=at_rest.wall_lift / weight,
+        floor_share_of_weight=run.carried[0] / weight,
+        wall_share_of_weight=run.carried[1] / weight,
         energy_error=run.energy_error,
         steps=box.steps,
         rebuilds=box.rebuilds,
         time_step=box.dt,
         step_over_critical=run.over,
     )
+
+
+def _put_plate(run: _Run, law: LinearLaw, recipe: BedRecipe) -> None:
+    """Light, so that it follows the bed, and its dashpot is critical on the bed's stiffness."""
+    box, small = run.box, float(law.radius.min())
+    mean_k = float(np.mean(np.diag(law.pairs.kn)))
+    top = float(np.max(box.bodies.position[:, 2] + box.bodies.radius))
+    push = recipe.pressure * run.area
+    cell = (2.0 * small) ** 2
+    footing = min(run.area, len(run.insertion_kind) * cell)  # few grains are fewer than a layer
+    layer = footing / cell * float(law.mass.min())
+    mass = max(0.1 * run.mass, 0.3 * layer)  # a lighter one would need a shorter time step
+    stiffness = mean_k * footing / (2.0 * small) / top  # of a plate on a column of springs
+    damping = 2.0 * np.sqrt(stiffness * mass)
+    run.pace = float(np.pi * np.sqrt((run.mass / 3.0 + mass) / stiffness))
+    box.set_piston(top, mass, damping, push, push / (recipe.ramp * run.pace))

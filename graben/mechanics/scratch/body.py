@@ -6,7 +6,7 @@ import time as clock_module
 
 import numpy as np
 
-from graben.errors import NumericsFailed
+from graben.errors import NumericsFailed, Refused
 from graben.mechanics.compiled import kernel
 from graben.mechanics.elements.hex8 import shape_gradient, volume_gradient
 from graben.mechanics.scratch.contact import sphere_contact
@@ -18,6 +18,17 @@ from graben.mechanics.scratch.one_point import EXTERNAL, KINETIC, LEDGER_SIZE, f
 from graben.mechanics.scratch.setup import Damage, Numerics, Tip
 from graben.mechanics.scratch.stepping import kick_and_drift, kinetic_energy, refresh
 from graben.mechanics.scratch.surface import bared_supports, contact_stiffness, exposed_faces
+from graben.mechanics.stored import Arrays, like, listed, within
+
+# What steps change; `_step` fills the rest before it is read, and the surface follows from what is alive.
+_ARRAYS = (
+    "x", "v", "force", "tangent", "alive", "vol", "rot", "sig", "state", "hour", "node_mass", "scaled", "clock",
+    "tip", "contact_force", "mean_force", "ledger", "par",
+)  # fmt: skip
+_NUMBERS = (
+    "work_before", "damping", "loop_seconds", "first_step", "smallest_step", "added_share", "largest_factor",
+)  # fmt: skip
+_COUNTS = ("steps", "updates", "touching")
 
 
 def elastic_moduli(par: Floats) -> tuple[float, float]:
@@ -224,6 +235,32 @@ class Body:
             step=self.steps,
             advice="lower numerics.safety or the speeds, or raise numerics.hourglass",
         )
+
+    def stored(self) -> Arrays:
+        """Copies of all that steps change."""
+        numbers = [getattr(self, name) for name in _NUMBERS]
+        counts = [getattr(self, name) for name in _COUNTS]
+        arrays = {name: getattr(self, name).copy() for name in _ARRAYS}
+        return {"numbers": np.array(numbers, dtype=float), "counts": np.array(counts, dtype=np.int64), **arrays}
+
+    def bring_back(self, stored: Arrays) -> None:
+        """Take up a state of `stored`. Refused where it is none of this body."""
+        numbers = listed(stored.get("numbers"), "numbers", len(_NUMBERS))
+        counts = listed(stored.get("counts"), "counts", len(_COUNTS))
+        found = {name: like(getattr(self, name), stored.get(name), name) for name in _ARRAYS}
+        within(found["alive"], "alive", 0, 1)
+        clock = found["clock"]
+        if not (found["alive"].any() and (found["node_mass"] > 0.0).all() and (found["vol"] > 0.0).all()):
+            raise Refused("alive, node_mass, vol: a body")
+        if not (clock >= 0.0).all() or clock[1] <= 0.0 or numbers[_NUMBERS.index("first_step")] <= 0.0:
+            raise Refused("clock: time and length of the step")
+        for name, number in zip(_NUMBERS, numbers):
+            setattr(self, name, number)
+        for name, count in zip(_COUNTS, counts):
+            setattr(self, name, int(count))
+        for name, array in found.items():
+            setattr(self, name, array)
+        self._expose()
 
     def snapshot(self, name: str) -> Snapshot:
         """Copy of the present state for pictures and sections."""

@@ -127,7 +127,7 @@ class BiaxialReport:
     def _moved(self, displacement: np.ndarray) -> float:
         """What the top of the rock has moved along y [m].
 
-        Its speed rises over the first steps, so speed times time is too much. displacement : (vertices of the rock, 2)
+        Its speed rises over the first steps, so speed times time is too much. displacement : (rock vertices, 2)
         """
         bodies = self.model.bodies
         top = bodies.vertex_side[: len(displacement), rectangle_sides(bodies.outline).top]

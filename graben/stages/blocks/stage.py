@@ -8,18 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from graben.errors import BadInput, Fault, MachineFailed, NumericsFailed, Refused
+from graben.errors import BadInput, Fault, NumericsFailed, Refused
 from graben.mechanics.blocks.engine.model import BlockModel
 from graben.mechanics.blocks.loading.protocol import Loading
-from graben.mechanics.blocks.record import snapshot
 from graben.mechanics.blocks.record.history import History
 from graben.schemas.artifact import write_artifact
 from graben.schemas.files import together
 from graben.schemas.layouts.blocks import LAYOUT
 from graben.schemas.outputs import CHECKPOINT, PARTIAL, SERIES, Outputs, beside
 from graben.schemas.scenes.blocks import BlocksScene
-from graben.stages.blocks import checkpoint as blocks_checkpoint
 from graben.stages.blocks.biaxial import BiaxialReport, biaxial
+from graben.stages.blocks.checkpoint import bring_back, state_of, states_of
 from graben.stages.blocks.extent import extent_of, map_of
 from graben.stages.blocks.geometry import Ground, lay_out
 from graben.stages.blocks.model import block_model
@@ -27,6 +26,7 @@ from graben.stages.blocks.output import SPARE, write_vtk
 from graben.stages.blocks.programme import ProgrammeReport, programme
 from graben.stages.blocks.report import Report, turnover
 from graben.stages.blocks.sizes import sizes_of, steps_of
+from graben.stages.shared.checkpoint import Checkpoint
 from graben.stages.shared.estimate import Estimate, refuse_too_large
 from graben.stages.shared.fields import kept
 from graben.stages.shared.last_good import keep_by, keeps_last_good, write_whole
@@ -61,70 +61,65 @@ def run(scene: BlocksScene, output: Path, *, restart: bool = False, progress: Pr
     prepared = prepare(scene)
     ground, model, test, report = prepared.ground, prepared.model, prepared.test, prepared.report
     record = Record.begin(scene)
-    parts = blocks_checkpoint.read(output, scene) if restart else None
+    checkpoint = Checkpoint.of(output, scene, record)
+    stored = checkpoint.read() if restart else None
     progress(0.0, f"{ground.blocks.size} blocks come to rest")
-    if parts is None:
+    if stored is None:
         for moment in test.begin():
             progress(moment.fraction, moment.words)
     history = History(model, scene.output.balance)
-    if parts is not None:
-        _bring_back(blocks_checkpoint.path_for(output), model, test, history, parts)
-    keeper = blocks_checkpoint.Keeper(output, scene, len(history.time))
+    if stored is not None:
+        with checkpoint.bringing_back():
+            bring_back(stored, model, test, history)
+    sound = len(history.time)  # states that passed every check
 
     def written(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         return kept(scene.output.fields, ground.placed(arrays), SPARE)
 
     def keep(why: str) -> Path | None:
-        if not keeper.states:
+        if not sound:
             return None
-        history.cut(keeper.states)
+        history.cut(sound)
         path = beside(output, PARTIAL)
         write_artifact(path, LAYOUT, written(_arrays(model, history, report)), record, partial=why)
         return path
 
     keep_by(keep)
 
-    try:
+    with checkpoint.guarding():
         for moment in test.run():
             if moment.save:
                 history.save()
                 if not test.failed:
                     _check_ledger(history, scene.numerics.energy_limit, model.steps_done)
-                keeper.keep(model, history, test.state())
+                sound = len(history.time)
+                checkpoint.keep(lambda: state_of(model, test), later=states_of(history))
             progress(moment.fraction, moment.words)
-    except (NumericsFailed, KeyboardInterrupt):
-        keeper.stopped()
-        raise
-    arrays = _arrays(model, history, report)
-    headline = report.headline(arrays) | ground.mended
-    headline["warnings"] = record.warn(warnings_of(report.measures(headline)))
-    arrays = ground.placed(arrays)
-    of_rock = model.bodies.vertex_block[model.masses.first[:-1]] < model.bodies.rock
-    record.cost |= {
-        "steps": model.steps_done,
-        "consolidation_steps": int(test.rest[1]),
-        "zones": len(arrays["zone_block"]),
-        "zone_steps": model.steps_done * len(arrays["zone_block"]),
-        "contact_searches": model.rebuilds,
-        "time_step_s": model.dt,
-        "mass_ratio_median": float(np.median(model.mass_ratio[of_rock])),
-        "mass_ratio_max": float(model.mass_ratio[of_rock].max()),
-        "consolidation_unbalanced_force_ratio": float(test.rest[0]),
-        "largest_overlap_m": max(history.overlap),
-        **{name: headline[name] for name in (*report.errors, *_PACED) if name in headline},
-        **{f"block_{name}": value for name, value in ground.blocks.statistics().items()},
-        **ground.mended,
-        **({"local_origin_m": ground.origin.tolist()} if ground.origin.any() else {}),
-    }
-    try:
+        arrays = _arrays(model, history, report)
+        headline = report.headline(arrays) | ground.mended
+        headline["warnings"] = record.warn(warnings_of(report.measures(headline)))
+        arrays = ground.placed(arrays)
+        of_rock = model.bodies.vertex_block[model.masses.first[:-1]] < model.bodies.rock
+        record.cost |= {
+            "steps": model.steps_done,
+            "consolidation_steps": int(test.rest[1]),
+            "zones": len(arrays["zone_block"]),
+            "zone_steps": model.steps_done * len(arrays["zone_block"]),
+            "contact_searches": model.rebuilds,
+            "time_step_s": model.dt,
+            "mass_ratio_median": float(np.median(model.mass_ratio[of_rock])),
+            "mass_ratio_max": float(model.mass_ratio[of_rock].max()),
+            "consolidation_unbalanced_force_ratio": float(test.rest[0]),
+            "largest_overlap_m": max(history.overlap),
+            **{name: headline[name] for name in (*report.errors, *_PACED) if name in headline},
+            **{f"block_{name}": value for name, value in ground.blocks.statistics().items()},
+            **ground.mended,
+            **({"local_origin_m": ground.origin.tolist()} if ground.origin.any() else {}),
+        }
         with together():
             if scene.output.vtk:
                 write_vtk(output, arrays, scene.output.fields)
             write_whole(output, LAYOUT, kept(scene.output.fields, arrays, SPARE), record)
-    except (MachineFailed, KeyboardInterrupt):
-        keeper.stopped()
-        raise
-    keeper.remove()
     return headline
 
 
@@ -172,15 +167,6 @@ def _test(scene: BlocksScene, model: BlockModel, steps: int) -> tuple[Loading, R
         return compression, BiaxialReport(scene, compression)
     rising = programme(scene, model, steps)
     return rising, ProgrammeReport(scene, rising)
-
-
-def _bring_back(path: Path, model: BlockModel, test: Loading, history: History, parts: dict[str, Any]) -> None:
-    try:
-        snapshot.bring_back(model, parts["model"])
-        test.bring_back(parts["test"])
-        history.bring_back(parts["history"])
-    except Refused as error:
-        raise BadInput(Fault(str(path), "restart", "", f"a checkpoint of this model ({error})", True)) from error
 
 
 def _check_ledger(history: History, limit: float, step: int) -> None:

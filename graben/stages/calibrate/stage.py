@@ -25,8 +25,9 @@ from graben.stages.calibrate.compare import compare as compared
 from graben.stages.calibrate.measured import Reading, read_files
 from graben.stages.calibrate.output import arrays_of, distinct, headline_of, measures_of, note_of
 from graben.stages.calibrate.problem import Problem, problem_of, sizes_of
-from graben.stages.calibrate.state import State, digest_of
+from graben.stages.calibrate.state import State
 from graben.stages.calibrate.workers import workers_of
+from graben.stages.shared.checkpoint import Checkpoint
 from graben.stages.shared.estimate import Estimate, refuse_too_large
 from graben.stages.shared.last_good import keep_by, keeps_last_good, write_whole
 from graben.stages.shared.measures import warnings_of
@@ -158,19 +159,20 @@ def run(
     prepared = prepare(scene, curves, validate, compare, threads)
     sources, problem, others = prepared.sources, prepared.problem, prepared.others
     record = Record.begin(scene, [*sources, *validate, *compare])
-    texts = [p.scene.source.effective_text for p in (problem, *others)]
+    laws = [p.scene.law for p in (problem, *others)]
+    checkpoint = Checkpoint.of(output, scene, record, laws, STATE)
     with workers_of(scene.search, scene.workers, problem.plan.particles, cluster) as workers:
-        state = State(beside(output, STATE), digest_of(texts, sources), workers)
+        state = State(checkpoint, workers)
         if restart:
             state.load()
-        keep_by(lambda why: state.path if any(state.starts.values()) else None)
-        fitted = fit_curves(prepared, state, progress)
-    record.cost.update(fitted.cost)
-    fitted.headline["warnings"] = record.warn(fitted.headline["warnings"])
-    with together():
-        write_material(material_path, scene.law, fitted.material, fitted.note, record.warnings)
-        write_whole(output, LAYOUT, fitted.arrays, record, fitted.attributes)
-    state.finish()
+        keep_by(lambda why: checkpoint.path if any(state.starts.values()) else None)
+        with checkpoint.guarding():
+            fitted = fit_curves(prepared, state, progress)
+            record.cost.update(fitted.cost)
+            fitted.headline["warnings"] = record.warn(fitted.headline["warnings"])
+            with together():
+                write_material(material_path, scene.law, fitted.material, fitted.note, record.warnings)
+                write_whole(output, LAYOUT, fitted.arrays, record, fitted.attributes)
     progress(1.0, "done")
     return {**fitted.headline, "read": prepared.read, "output": str(output), "material": str(material_path)}
 

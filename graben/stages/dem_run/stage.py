@@ -6,7 +6,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from graben.errors import BadInput, Fault
 from graben.schemas.outputs import files_of
 from graben.schemas.scene import Given, Overrides, load_scene
 from graben.stages.shared.record import Progress, silent
@@ -23,7 +22,7 @@ def run(
 ) -> dict[str, Any]:
     """Run the scene and write its artifact; returns the headline numbers of the stage of its kind.
 
-    restart : go on from the checkpoint that a stopped run left beside the output (kind "blocks")
+    restart : go on from the checkpoint that a stopped run left beside the output
 
     Raises
     ------
@@ -33,10 +32,4 @@ def run(
     scene = load_scene(given, ("blocks", "particles"), overrides)
     stage = import_module(f"graben.stages.{scene.kind}.stage")
     stage.outputs_of(scene, output).claim(files_of(scene), overwrite=overwrite, restart=restart)
-    if not restart:
-        return stage.run(scene, output, progress=progress)
-    if scene.kind != "blocks":
-        raise BadInput(
-            Fault(str(scene.source.path), "restart", "", 'a scene of kind "blocks"; others start anew', True)
-        )
-    return stage.run(scene, output, restart=True, progress=progress)
+    return stage.run(scene, output, restart=restart, progress=progress)

@@ -8,11 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from graben.errors import Refused
 from graben.mechanics.fem.body import Body, State
 from graben.mechanics.fem.collapse import LoadCurve
 from graben.mechanics.fem.march import March
+from graben.mechanics.fem.stored import arrays_of_state, state_of
 from graben.mechanics.fem.surface import free_surface
 from graben.mechanics.meshes.mesh2d import QuadMesh
+from graben.mechanics.stored import Arrays, like, listed, named, part_of
 from graben.schemas.artifact import write_artifact
 from graben.schemas.files import together
 from graben.schemas.layouts.fem import LAYOUT
@@ -42,6 +45,24 @@ class SavedStates:
         whole = round(run.time / self._every)
         if abs(run.time - whole * self._every) < 1e-9 * self._end:
             self._saved.append(self._latest)
+
+    def stored(self) -> Arrays:
+        """All but the last one as arrays, without copies."""
+        found = {"time": np.array([t for t, _, _ in self._saved])}
+        for k, (_, state, force) in enumerate(self._saved):
+            found |= named(str(k), {**arrays_of_state(state), "force": force})
+        return found
+
+    def bring_back(self, stored: Arrays, body: Body, run: March) -> None:
+        """Take up states of `stored`; run: the march that stands on the last one. Refused where they are none."""
+        nothing = np.zeros(body.pattern.size)
+        self._saved = []
+        for k, time in enumerate(listed(stored.get("time"), "saved.time")):
+            own = part_of(stored, str(k))
+            self._saved.append((time, state_of(own, body), like(nothing, own.get("force"), f"saved.{k}.force")))
+        if not self._saved:
+            raise Refused("saved.time: one state at least")
+        self._latest = (run.time, run.state, run.force)
 
     def states(self) -> list[Saved]:
         """Saved states with the last one."""

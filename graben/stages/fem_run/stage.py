@@ -11,19 +11,22 @@ import numpy as np
 from graben.errors import NumericsFailed
 from graben.mechanics.fem.body import Body, Material
 from graben.mechanics.fem.collapse import LoadCurve, Overload
-from graben.mechanics.fem.march import March, StepOptions, advance, at_rest, march
+from graben.mechanics.fem.march import March, StepOptions, advance, at_rest
 from graben.mechanics.fem.newton import NewtonOptions
 from graben.mechanics.fem.stability import softest_stiffness
-from graben.schemas.outputs import LAST_GOOD, SERIES, Outputs, beside, files_of
+from graben.mechanics.fem.stored import arrays_of_march, march_of
+from graben.mechanics.stored import Arrays, named, part_of
+from graben.schemas.outputs import CHECKPOINT, LAST_GOOD, SERIES, Outputs, beside, files_of
 from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.fem import FemScene
 from graben.stages.fem_run.mesh import mesh_of
 from graben.stages.fem_run.model import Problem, problem_of
 from graben.stages.fem_run.output import SavedStates, arrays_of, write_run
 from graben.stages.fem_run.sizes import sizes_of
+from graben.stages.shared.checkpoint import Checkpoint, Keep
 from graben.stages.shared.estimate import Estimate, refuse_too_large
 from graben.stages.shared.last_good import keep_by, keeps_last_good
-from graben.stages.shared.material import pack_material
+from graben.stages.shared.material import names_of, pack_material
 from graben.stages.shared.measures import Measure, warnings_of
 from graben.stages.shared.record import Progress, Record, silent
 
@@ -47,6 +50,7 @@ def run(
     material: Path | None = None,
     overrides: Overrides = (),
     overwrite: bool = False,
+    restart: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Run a fem scene and write its artifact and VTU files.
@@ -54,6 +58,7 @@ def run(
     Parameters
     ----------
     material : a file with law and parameters that replaces the scene's
+    restart : go on from NAME.checkpoint.npz, which a run that was stopped left beside the output
 
     Returns
     -------
@@ -71,12 +76,17 @@ def run(
     """
     scene: FemScene = load_scene(given, "fem", overrides)
     last_good = beside(output, LAST_GOOD + ".nc")
-    kept = (LAST_GOOD + ".nc", *(LAST_GOOD + end for end in SERIES))
-    Outputs(output, SERIES, kept=kept).claim([*files_of(scene), material], overwrite=overwrite)
+    kept = (CHECKPOINT, LAST_GOOD + ".nc", *(LAST_GOOD + end for end in SERIES))
+    Outputs(output, SERIES, kept=kept).claim([*files_of(scene), material], overwrite=overwrite, restart=restart)
     progress(0.0, "meshing")
     problem, inputs, _ = prepare(scene, material)
     record = Record.begin(scene, inputs)
+    checkpoint = Checkpoint.of(output, scene, record, names_of(problem.body.law_ids))
     analysis = Analysis(scene, problem)
+    if restart:
+        stored = checkpoint.read()
+        with checkpoint.bringing_back():
+            analysis.bring_back(stored)
 
     def write(path: Path, partial: str = "") -> Path:
         record.cost |= analysis.cost
@@ -85,9 +95,10 @@ def run(
         return path
 
     keep_by(lambda why: write(last_good, why) if analysis.begun else None)
-    headline = analysis.solve(progress)
-    progress(0.98, "writing")
-    write(output)
+    with checkpoint.guarding():
+        headline = analysis.solve(progress, checkpoint.keep)
+        progress(0.98, "writing")
+        write(output)
     progress(1.0, "done")
     return headline | {"warnings": record.warnings}
 
@@ -99,6 +110,7 @@ class Analysis:
     ----------
     headline : numbers, as `run` returns them; cost : figures for the record
     begun : whether there is a state to keep
+    settled, loaded : how far gravity is, and the rising loads
     """
 
     def __init__(self, scene: FemScene, problem: Problem) -> None:
@@ -109,9 +121,13 @@ class Analysis:
             "failed": True, "failure_load_pa": None, "compliance_ratio": 1.0, "stiffness_ratio": 1.0, "warnings": [],
         }  # fmt: skip
         self._notes = notes
+        self.settled = at_rest(problem.body, problem.body.untouched(), 0.0)
+        self.loaded: March | None = None
 
-    def solve(self, progress: Progress = silent) -> dict[str, Any]:
-        """Gravity, then the rising loads; returns the headline numbers.
+    def solve(self, progress: Progress = silent, keep: Keep = lambda take: None) -> dict[str, Any]:
+        """Gravity, then the rising loads, from where they stand; returns the headline numbers.
+
+        keep : told of each state to go on from, and how to take it
 
         Raises
         ------
@@ -120,18 +136,20 @@ class Analysis:
         scene, problem, body = self.scene, self.problem, self.problem.body
         progress(0.01, f"{len(body.mesh.quads)} elements; gravity")
         newton = NewtonOptions(scene.stepping.tolerance, scene.stepping.max_iterations)
-        settled = march(body, body.untouched(), lambda t: t * problem.steady, 0.0, 1.0, _GRAVITY_STEPS, newton)
-        self.settled = settled
-        self.curve = LoadCurve(problem.pressure, settled.state.displacement)
-        self.saved = SavedStates(scene.stepping, settled)
-        self.begun = True
+        settled = self.settled
+        if self.loaded is None:
+            for _ in advance(settled, body, lambda t: t * problem.steady, 1.0, _GRAVITY_STEPS, newton):
+                keep(self.stored)
+            self._begin_loads()
         if not settled.complete:
             raise NumericsFailed(
                 f"no equilibrium beyond {100 * settled.time:.3g} % of gravity ({settled.reason})",
                 advice="the body does not stand under its own weight: check supports, strength and density",
             )
         options = scene.stepping
-        loaded = at_rest(body, settled.state, 0.0)
+        if self.loaded is None:
+            self.loaded = at_rest(body, settled.state, 0.0)
+        loaded = self.loaded
         for step in advance(
             loaded, body, problem.external, options.end,
             StepOptions(
@@ -144,6 +162,7 @@ class Analysis:
         ):  # fmt: skip
             self.curve.add(loaded.time, loaded.state.displacement, step.drag, step.iterations)
             self.saved.add(loaded)
+            keep(self.stored)
             done = f"{loaded.time:.4g} s, {self.curve.pressure[-1] / 1e6:.4g} MPa, {step.iterations} iterations"
             progress(0.02 + 0.95 * loaded.time / options.end, done)
         headline = _headline(scene, problem, settled, loaded, self.curve) | self._notes
@@ -157,6 +176,29 @@ class Analysis:
                 advice='set stepping.goal = "failure" if this load is what you want, or lower stepping.smallest',
             )
         return headline
+
+    def _begin_loads(self) -> None:
+        self.curve = LoadCurve(self.problem.pressure, self.settled.state.displacement)
+        self.saved = SavedStates(self.scene.stepping, self.settled)
+        self.begun = True
+
+    def stored(self) -> Arrays:
+        """The state of the analysis, to go on from bitwise."""
+        found = named("settled", arrays_of_march(self.settled))
+        if self.loaded is not None:
+            found |= named("loaded", arrays_of_march(self.loaded))
+            found |= named("curve", self.curve.stored()) | named("saved", self.saved.stored())
+        return found
+
+    def bring_back(self, stored: Arrays) -> None:
+        """Take up a state of `stored`. Refused where it is none of this problem."""
+        body, loaded = self.problem.body, part_of(stored, "loaded")
+        self.settled = march_of(part_of(stored, "settled"), body, 1.0)
+        if loaded:
+            self.loaded = march_of(loaded, body, self.scene.stepping.end)
+            self._begin_loads()
+            self.curve.bring_back(part_of(stored, "curve"), self.loaded.state.displacement)
+            self.saved.bring_back(part_of(stored, "saved"), body, self.loaded)
 
     def arrays(self) -> dict[str, Any]:
         """Arrays of the layout "fem"."""

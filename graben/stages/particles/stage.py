@@ -4,30 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from graben.errors import BadInput, Fault, Refused
-from graben.mechanics.particles.bed import (
-    HISTORY,
-    NOMINAL_FRACTION,
-    Bed,
-    BedFailed,
-    BedRecipe,
-    Snapshot,
-    check_recipe,
-    column_height,
-    make_bed,
-)
+from graben.mechanics.particles.bed import HISTORY, PHASES, Bed, BedFailed, Snapshot, make_bed
 from graben.mechanics.particles.law import LinearLaw, critical_step
+from graben.mechanics.particles.recipe import NOMINAL_FRACTION, BedRecipe, check_recipe, column_height
 from graben.mechanics.particles.sampling import interval_over_areas, interval_over_beds
+from graben.mechanics.stored import Arrays, listed, named, part_of
 from graben.schemas.files import together
 from graben.schemas.layouts.particles import LAYOUT
-from graben.schemas.outputs import LAST_GOOD, PARTIAL, SERIES, Outputs, beside
+from graben.schemas.outputs import CHECKPOINT, LAST_GOOD, PARTIAL, SERIES, Outputs, beside
 from graben.schemas.scenes.particles import ParticlesScene
 from graben.schemas.vtk import vtu_series, write_vtu
+from graben.stages.particles.checkpoint import arrays_of_bed, bed_of
+from graben.stages.shared.checkpoint import Checkpoint
 from graben.stages.shared.estimate import Estimate, refuse_too_large, work
 from graben.stages.shared.fidelity import setting
 from graben.stages.shared.fields import kept
@@ -44,12 +40,14 @@ _GRAIN_BYTES = 4000.0  # states, contacts and their histories
 
 def outputs_of(scene: ParticlesScene, output: Path) -> Outputs:
     """What a run writes, and what it leaves when it fails."""
-    return Outputs(output, SERIES if scene.output.vtk else (), kept=(LAST_GOOD + ".vtu", PARTIAL))
+    return Outputs(output, SERIES if scene.output.vtk else (), kept=(CHECKPOINT, LAST_GOOD + ".vtu", PARTIAL))
 
 
 @keeps_last_good("no grain had moved yet")
-def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> dict[str, Any]:
+def run(scene: ParticlesScene, output: Path, *, restart: bool = False, progress: Progress = silent) -> dict[str, Any]:
     """Make the beds of a scene, write the artifact and its VTU files.
+
+    restart : go on from NAME.checkpoint.npz, which a run that was stopped left beside the output
 
     Returns
     -------
@@ -64,30 +62,27 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
     """
     law, recipe, _ = prepare(scene)
     record = Record.begin(scene)
-    try:
-        beds = [make_bed(law, recipe, scene.seed + b, _part(progress, b, scene.beds)) for b in range(scene.beds)]
-    except BedFailed as failure:
-        state = failure.last_good
-        keep_by(lambda why: _write_last_good(output, state))
-        raise
-
-    arrays = _arrays(scene, law, beds)
-    record.cost |= {
-        "steps": sum(b.steps for b in beds),
-        "particles": sum(len(b.radius) for b in beds),
-        "particle_steps": sum(b.steps * len(b.radius) for b in beds),
-        "neighbour_list_rebuilds": sum(b.rebuilds for b in beds),
-        "time_step_s": beds[0].time_step,
-        "time_step_over_critical": max(b.step_over_critical for b in beds),
-        "energy_error": max(b.energy_error for b in beds),
-        "unbalanced_force_ratio": max(b.survey.unbalanced for b in beds),
-        "largest_overlap_over_radius": max(b.survey.overlap for b in beds),
-    }
-    record.warn(warnings_of(_measures(record.cost)))
-    with together():
-        if scene.output.vtk:
-            _write_vtk(output, law, beds[0], scene.output.fields)
-        write_whole(output, LAYOUT, kept(scene.output.fields, arrays, _SPARE), record)
+    checkpoint = Checkpoint.of(output, scene, record)
+    stored = checkpoint.read() if restart else None
+    with checkpoint.guarding():
+        beds = _beds(scene, law, recipe, checkpoint, stored, output, progress)
+        arrays = _arrays(scene, law, beds)
+        record.cost |= {
+            "steps": sum(b.steps for b in beds),
+            "particles": sum(len(b.radius) for b in beds),
+            "particle_steps": sum(b.steps * len(b.radius) for b in beds),
+            "neighbour_list_rebuilds": sum(b.rebuilds for b in beds),
+            "time_step_s": beds[0].time_step,
+            "time_step_over_critical": max(b.step_over_critical for b in beds),
+            "energy_error": max(b.energy_error for b in beds),
+            "unbalanced_force_ratio": max(b.survey.unbalanced for b in beds),
+            "largest_overlap_over_radius": max(b.survey.overlap for b in beds),
+        }
+        record.warn(warnings_of(_measures(record.cost)))
+        with together():
+            if scene.output.vtk:
+                _write_vtk(output, law, beds[0], scene.output.fields)
+            write_whole(output, LAYOUT, kept(scene.output.fields, arrays, _SPARE), record)
     classes = [
         {
             "name": g.name,
@@ -109,6 +104,52 @@ def run(scene: ParticlesScene, output: Path, *, progress: Progress = silent) -> 
         "floor_share_of_weight": float(np.mean([b.floor_share_of_weight for b in beds])),
         "wall_share_of_weight": float(np.mean([b.wall_share_of_weight for b in beds])),
     }
+
+
+def _beds(
+    scene: ParticlesScene,
+    law: LinearLaw,
+    recipe: BedRecipe,
+    checkpoint: Checkpoint,
+    stored: Arrays | None,
+    output: Path,
+    progress: Progress,
+) -> list[Bed]:
+    """All beds, from where a stopped run left off.
+
+    stored : what its checkpoint held; None where there is none
+    """
+    beds: list[Bed] = []
+    finished: Arrays = {}
+    under_way: Arrays | None = None
+    if stored is not None:
+        names = ["inserted", *(n for n in PHASES if n != "shaking" and (recipe.shakes > 0 or n != "shaken"))]
+        with checkpoint.bringing_back():
+            [count] = listed(stored.get("beds"), "beds", 1)
+            if not 0 <= count <= scene.beds:
+                raise Refused(f"beds: at most {scene.beds}")
+            beds = [bed_of(part_of(stored, f"bed.{b}"), len(scene.grains), names) for b in range(int(count))]
+        finished = {name: values for name, values in stored.items() if name.startswith("bed.")}
+        under_way = part_of(stored, "run") or None
+
+    def state(own: Arrays) -> Arrays:
+        return {"beds": np.array([len(beds)]), **finished, **named("run", own)}
+
+    for b in range(len(beds), scene.beds):
+        try:
+            with checkpoint.bringing_back() if under_way is not None else nullcontext():
+                bed = make_bed(
+                    law, recipe, scene.seed + b, _part(progress, b, scene.beds),
+                    lambda take: checkpoint.keep(lambda: state(take())), under_way,
+                )  # fmt: skip
+        except BedFailed as failure:
+            keep_by(partial(lambda state, why: _write_last_good(output, state), failure.last_good))
+            raise
+        under_way = None
+        beds.append(bed)
+        finished |= named(f"bed.{b}", arrays_of_bed(bed))
+        checkpoint.keep(lambda: state({}))
+    return beds
 
 
 def _measures(cost: dict[str, Any]) -> list[Measure]:

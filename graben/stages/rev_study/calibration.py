@@ -21,6 +21,7 @@ from graben.mechanics.optimise.multistart import Found, Plan, search
 from graben.mechanics.optimise.space import Box
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.rev_study import RevStudyScene
+from graben.stages.rev_study.done import Done
 from graben.stages.shared.material import find_law
 from graben.stages.shared.record import Progress
 from graben.stages.shared.workers import compute
@@ -42,11 +43,15 @@ class FitTask:
     guesses: np.ndarray | None
     curves: tuple[Curve, ...]
 
-    def solve(self) -> tuple[CurveFit, Found]:
-        """The best parameters in the unit box."""
-        fit = CurveFit(
+    def fit(self) -> CurveFit:
+        """The law against the curves."""
+        return CurveFit(
             self.law, self.fixed, self.box.names, self.curves, self.weights, length=self.length, parts=self.increments
         )
+
+    def solve(self) -> tuple[CurveFit, Found]:
+        """The best parameters in the unit box."""
+        fit = self.fit()
         found = search(
             lambda unit: fit.residuals(self.box.to_values(unit)),
             self.box.size,
@@ -93,6 +98,7 @@ def fit_samples(
     processes: int,
     cluster: str | None,
     progress: Progress,
+    done: Done | None = None,
 ) -> Fits:
     """Fit the law to the curves of every (radius, centre, realization).
 
@@ -103,6 +109,7 @@ def fit_samples(
     groups : (realization, confinement) runs of each realization
     middle : the centre whose largest radius gives the first fit
     processes, cluster, progress : see `compute`
+    done : fits that are there already; takes the others
 
     Raises
     ------
@@ -122,16 +129,24 @@ def fit_samples(
 
     progress(0.0, "the first fit, at the largest radius")
     first = task(radii - 1, middle, groups[0], first_plan(scene), None)
-    fit, found = first.solve()
-    best = found.best
-    slopes, coarse = (jacobian(lambda u: fit.residuals(box.to_values(u)), best.x, step) for step in (1e-4, 2e-4))
+    done = done or Done()
+    if done.first is None:
+        done.fitted_first(first.solve()[1].members)
+    fit, members = first.fit(), done.first
+    assert members is not None
+    best = members[0]
+    residuals = fit.residuals(box.to_values(best[None]))[0]
+    slopes, coarse = (jacobian(lambda u: fit.residuals(box.to_values(u)), best, step) for step in (1e-4, 2e-4))
     known = identify(
-        best.x, best.residuals, slopes, groups=fit.groups, lag=first.lag, noise=coarse - slopes, floor=fit.floor
+        best, residuals, slopes, groups=fit.groups, lag=first.lag, noise=coarse - slopes, floor=fit.floor
     )
-    guesses = found.members[: values_at("rev-study", scene.fidelity)["calibration.each.best"]]
+    guesses = members[: values_at("rev-study", scene.fidelity)["calibration.each.best"]]
     each = each_plan(scene, len(guesses))
     tasks = [task(r, c, runs, each, guesses) for r in range(radii) for c in range(centres) for runs in groups]
-    results = compute(fit_sample, tasks, processes, lambda f: progress(0.1 + 0.9 * f, "calibrating"), cluster=cluster)
+    results = compute(
+        fit_sample, tasks, processes, lambda f: progress(0.1 + 0.9 * f, "calibrating"), cluster=cluster,
+        known=done.fits, got=done.fitted,
+    )  # fmt: skip
     shape = (radii, centres, len(groups))
     return Fits(
         names=box.names,
@@ -192,6 +207,11 @@ def _box(scene: CalibrateScene) -> Box:
     except Refused as error:
         raise BadInput(Fault(path, "", "", f"a law that can be fitted ({error})")) from error
     return Box.of(names, lower, upper, log)
+
+
+def parameters_of(law: CalibrateScene) -> int:
+    """How many a fit has."""
+    return _box(law).size
 
 
 def chosen_parameters(scene: RevStudyScene, fits: Fits) -> Sequence[str]:

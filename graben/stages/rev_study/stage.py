@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from graben.errors import BadInput, Fault
-from graben.mechanics.averaging.history import average
 from graben.mechanics.averaging.measures import MEASURES, curve_measures
 from graben.mechanics.averaging.representative import (
     Convergence,
@@ -22,24 +21,22 @@ from graben.mechanics.averaging.representative import (
 )
 from graben.mechanics.averaging.rev import Circle
 from graben.schemas.layouts.rev_study import LAYOUT
-from graben.schemas.outputs import Outputs, files_of
+from graben.schemas.outputs import CHECKPOINT, PARTIAL, Outputs, files_of
 from graben.schemas.scene import load_scene
 from graben.schemas.scenes.calibrate import CalibrateScene
 from graben.schemas.scenes.rev_study import RevStudyScene
 from graben.stages.blocks.history import Run, read_run
-from graben.stages.rev_study.calibration import Fits, check_law, chosen_parameters, fit_samples
+from graben.stages.rev_study.calibration import Fits, check_law, chosen_parameters, fit_samples, parameters_of
+from graben.stages.rev_study.done import Done, Sample
+from graben.stages.rev_study.samples import Chunk, chunks_of, sampled
+from graben.stages.shared.checkpoint import Checkpoint
 from graben.stages.shared.estimate import Estimate, refuse_too_large
 from graben.stages.shared.fidelity import setting
 from graben.stages.shared.last_good import keeps_last_good, write_whole
 from graben.stages.shared.measures import Measure, warnings_of
 from graben.stages.shared.record import Progress, Record, silent
-from graben.stages.shared.workers import compute
 
 _SAMPLE_BYTES = 20_000.0  # curves of a hundred states
-
-# One chunk of samples: the file, and its (radius, x, y); one result each: stress, strain, area, blocks, which ones.
-Chunk = tuple[Path, list[tuple[float, float, float]]]
-Sample = tuple[np.ndarray, np.ndarray, float, int, bytes]
 
 
 def prepare(scene: RevStudyScene, runs: int = 1) -> tuple[CalibrateScene | None, list[Estimate]]:
@@ -74,6 +71,7 @@ def run(
     *,
     cluster: str | None = None,
     overwrite: bool = False,
+    restart: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Average every run at every radius and centre; test which radius is large enough.
@@ -84,6 +82,7 @@ def run(
     scene : radii, places, tests
     output : artifact of kind "rev-study"
     cluster : address of a Dask scheduler whose workers take the samples; they read the inputs themselves
+    restart : go on from NAME.checkpoint.npz, which a study that was stopped left beside the output
 
     Returns
     -------
@@ -96,15 +95,40 @@ def run(
     """
     law, _ = prepare(scene, len(inputs))
     read = files_of(scene) + (files_of(law) if law is not None else [])
-    Outputs(output).claim([*inputs, *read], overwrite=overwrite)
+    Outputs(output, kept=(CHECKPOINT, PARTIAL)).claim([*inputs, *read], overwrite=overwrite, restart=restart)
     runs = _read(inputs, scene, progress)
     groups = _realizations(runs)
     record = Record.begin(scene, inputs=[*inputs, *([law.source.path] if law else [])])
-    processes = scene.processes or os.cpu_count() or 1
+    checkpoint = Checkpoint.of(output, scene, record, [law.law] if law else [])
     centres = _centres(runs, scene)
-    chunks = _chunks(runs, centres, scene)
+    chunks = chunks_of(runs, centres, scene)
+    done = Done(checkpoint.keep)
+    if restart:
+        stored = checkpoint.read()
+        fits = len(scene.samples.radii) * centres.shape[1] * len(groups) if law else 0
+        with checkpoint.bringing_back():
+            done.bring_back(stored, [len(places) for _, places in chunks], fits, parameters_of(law) if law else 0)
+    with checkpoint.guarding():
+        return _study(runs, groups, centres, chunks, scene, law, record, output, cluster, done, progress)
+
+
+def _study(
+    runs: list[Run],
+    groups: np.ndarray,
+    centres: np.ndarray,
+    chunks: list[Chunk],
+    scene: RevStudyScene,
+    law: CalibrateScene | None,
+    record: Record,
+    output: Path,
+    cluster: str | None,
+    done: Done,
+    progress: Progress,
+) -> dict[str, Any]:
+    """All samples and fits that are not done, their statistics, the artifact and its headline numbers."""
+    processes = scene.processes or os.cpu_count() or 1
     end = 0.5 if law else 1.0
-    samples = _sampled(chunks, processes, cluster, lambda f, words: progress(end * f, words))
+    samples = sampled(chunks, processes, cluster, done, lambda f, words: progress(end * f, words))
     arrays = _arrays(runs, centres, samples, scene)
     counts = _counts_once(samples, arrays["area"].shape)
     criteria = Criteria(
@@ -123,7 +147,7 @@ def run(
         middle = int(np.argmin(((centres[0] - centres[0].mean(axis=0)) ** 2).sum(axis=1)))
         fits = fit_samples(
             scene, law, arrays["stress"], arrays["strain"], groups, middle, processes, cluster,
-            lambda f, words: progress(0.5 + 0.5 * f, words),
+            lambda f, words: progress(0.5 + 0.5 * f, words), done,
         )  # fmt: skip
         chosen = chosen_parameters(scene, fits)
         of_fit = counts[:, :, groups].any(axis=3)
@@ -136,7 +160,10 @@ def run(
     if missing:
         wanted = "a value in at least one sample of every radius (does the curve rise, and peak inside the run?)"
         raise BadInput(
-            [Fault(", ".join(map(str, inputs)), f"curves.properties {name}", "none", wanted) for name in missing]
+            [
+                Fault(", ".join(str(r.path) for r in runs), f"curves.properties {name}", "none", wanted)
+                for name in missing
+            ]
         )
     advice = recommend(radii, {name: by_name[name] for name in chosen}, independent)
     arrays["independent_samples"] = independent
@@ -308,37 +335,6 @@ def _grid(source: Run, largest: float, side: int) -> np.ndarray:
     steps = np.linspace(-1.0, 1.0, side) if side > 1 else np.zeros(1)
     x, y = np.meshgrid(middle[0] + room[0] * steps, middle[1] + room[1] * steps, indexing="ij")
     return np.stack([x.ravel(), y.ravel()], axis=1)
-
-
-def _chunks(runs: list[Run], centres: np.ndarray, scene: RevStudyScene) -> list[Chunk]:
-    """Samples in the order (run, centre, radius), some centres of one run per chunk, so that each is read seldom."""
-    chunks = []
-    for source, points in zip(runs, centres):
-        for part in np.array_split(points, min(4, len(points))):
-            chunks.append((source.path, [(r, float(x), float(y)) for x, y in part for r in scene.samples.radii]))
-    return chunks
-
-
-def sample_chunk(chunk: Chunk) -> list[Sample]:
-    """The averages of one chunk; runs in a worker process."""
-    path, places = chunk
-    history = read_run(path).history
-    results = []
-    for radius, x, y in places:
-        a = average(history, Circle((x, y), radius))
-        which = a.outline.blocks
-        results.append((a.stress, a.strain, a.area, int(which.sum()), np.packbits(which).tobytes()))
-    return results
-
-
-def _sampled(chunks: list[Chunk], processes: int, cluster: str | None, progress: Progress) -> list[Sample]:
-    """All samples in the order of the chunks, whatever the number of workers and their fate."""
-    if cluster is not None:
-        chunks = [(path.resolve(), places) for path, places in chunks]
-    results = compute(
-        sample_chunk, chunks, processes, lambda f: progress(0.1 + 0.9 * f, "averaging"), cluster=cluster
-    )
-    return [sample for part in results for sample in part]
 
 
 def _arrays(runs: list[Run], centres: np.ndarray, samples: list[Sample], scene: RevStudyScene) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,11 @@ from graben.mechanics.materials.laws import LAWS
 from graben.mechanics.scratch import run as mechanics
 from graben.mechanics.scratch.mesh import HexMesh, cells_along, specimen
 from graben.mechanics.scratch.setup import Damage, Numerics, Tip
-from graben.schemas.outputs import LAST_GOOD, PARTIAL, SERIES, Outputs, files_of
+from graben.schemas.outputs import CHECKPOINT, LAST_GOOD, PARTIAL, SERIES, Outputs, files_of
 from graben.schemas.scene import Given, Overrides, load_scene
 from graben.schemas.scenes.scratch import ScratchScene
 from graben.stages.scratch.output import LEAST, measure_groove, write_last_good, write_run
+from graben.stages.shared.checkpoint import Checkpoint
 from graben.stages.shared.estimate import Estimate, refuse_too_large, work
 from graben.stages.shared.fidelity import factor_of
 from graben.stages.shared.last_good import keep_by, keeps_last_good
@@ -39,6 +41,7 @@ def run(
     material: Path | None = None,
     overrides: Overrides = (),
     overwrite: bool = False,
+    restart: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Run a scratch scene; write its artifact, and VTU files with a PVD beside it.
@@ -46,6 +49,7 @@ def run(
     Parameters
     ----------
     material : a file with law and parameters that replaces the scene's
+    restart : go on from NAME.checkpoint.npz, which a run that was stopped left beside the output
 
     Returns
     -------
@@ -59,38 +63,44 @@ def run(
     NumericsFailed : energy, volume or mass error beyond the scene's limits; the last good state is kept as VTU
     """
     scene: ScratchScene = load_scene(given, "scratch", overrides)
-    outputs = Outputs(output, SERIES, kept=(LAST_GOOD + ".vtu", PARTIAL))
-    outputs.claim([*files_of(scene), material], overwrite=overwrite)
+    outputs = Outputs(output, SERIES, kept=(CHECKPOINT, LAST_GOOD + ".vtu", PARTIAL))
+    outputs.claim([*files_of(scene), material], overwrite=overwrite, restart=restart)
     law, par, inputs, _ = prepare(scene, material)
     record = Record.begin(scene, inputs)
+    checkpoint = Checkpoint.of(output, scene, record, [law.name])
+    stored = checkpoint.read() if restart else None
     mesh = mesh_of(scene)
     progress(0.0, f"{len(mesh.cells)} elements")
-    try:
-        result = mechanics.simulate(
-            mesh,
-            law.id,
-            par,
-            law.initial_state(par),
-            scene.specimen.density,
-            Tip(scene.tip.radius, scene.tip.friction, scene.tip.start, scene.tip.depth, scene.tip.path),
-            numerics_of(scene),
-            _damage(scene, law),
-            scene.output.frames,
-            progress,
-            _slots(law),
-        )
-    except mechanics.ScratchFailed as failure:
-        state = failure.last_good
-        keep_by(lambda why: write_last_good(output, mesh, state))
-        raise
-    progress(0.99, "sections")
-    groove = measure_groove(scene, mesh, result)
-    headline = {**groove.headline, **_cost(result)}
-    headline["warnings"] = record.warn(warnings_of(_measures(headline, scene.tip.depth)))
-    record.cost.update(result.cost)
-    record.cost.update({k: headline[k] for k in ("energy_error", "hourglass_share", "kinetic_share_sliding")})
-    record.cost["mesh_size_m"] = mesh_size(scene)
-    write_run(output, record, scene, mesh, result, groove)
+    with checkpoint.guarding():
+        try:
+            with checkpoint.bringing_back() if restart else nullcontext():
+                result = mechanics.simulate(
+                    mesh,
+                    law.id,
+                    par,
+                    law.initial_state(par),
+                    scene.specimen.density,
+                    Tip(scene.tip.radius, scene.tip.friction, scene.tip.start, scene.tip.depth, scene.tip.path),
+                    numerics_of(scene),
+                    _damage(scene, law),
+                    scene.output.frames,
+                    progress,
+                    _slots(law),
+                    checkpoint.keep,
+                    stored,
+                )
+        except mechanics.ScratchFailed as failure:
+            state = failure.last_good
+            keep_by(lambda why: write_last_good(output, mesh, state))
+            raise
+        progress(0.99, "sections")
+        groove = measure_groove(scene, mesh, result)
+        headline = {**groove.headline, **_cost(result)}
+        headline["warnings"] = record.warn(warnings_of(_measures(headline, scene.tip.depth)))
+        record.cost.update(result.cost)
+        record.cost.update({k: headline[k] for k in ("energy_error", "hourglass_share", "kinetic_share_sliding")})
+        record.cost["mesh_size_m"] = mesh_size(scene)
+        write_run(output, record, scene, mesh, result, groove)
     progress(1.0, "done")
     return headline
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from graben.errors import BadInput, Fault, Refused
 from graben.mechanics.materials.law import Law
-from graben.mechanics.materials.laws import find
+from graben.mechanics.materials.laws import LAWS, find
 from graben.schemas.scenes.material import MaterialTable, read_material
 
 
@@ -21,6 +21,12 @@ def find_law(law: str, file: str | Path = "") -> Law:
         return find(law)
     except Refused as error:
         raise BadInput(Fault(str(file), "law", repr(law), str(error))) from error
+
+
+def names_of(ids: Iterable[int]) -> list[str]:
+    """Names of laws by their ids, as kernels take them."""
+    names = {law.id: name for name, law in LAWS.items()}
+    return [names[number] for number in map(int, ids)]
 
 
 def pack_values(

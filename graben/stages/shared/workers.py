@@ -9,8 +9,8 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import active_children, get_context, parent_process
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 Done = Callable[[float], None]
+Got = Callable[[int, Any], None]
 
 _ATTEMPTS = 3
 PATIENCE_S = 60.0  # a cluster without any worker for so long is given up
@@ -35,6 +36,8 @@ def compute(
     *,
     cluster: str | None = None,
     patience_s: float = PATIENCE_S,
+    known: Mapping[int, Any] | None = None,
+    got: Got = lambda number, result: None,
 ) -> list[Any]:
     """`work` of every task, in the order of the tasks.
 
@@ -46,6 +49,8 @@ def compute(
     done : told the finished fraction
     cluster : address of a Dask scheduler, such as "tcp://10.0.0.1:8786"
     patience_s : seconds to wait for a scheduler, and for workers where there are none
+    known : results that are there already, by number of the task
+    got : told each new result, with the number of its task
 
     Raises
     ------
@@ -53,17 +58,24 @@ def compute(
     BrokenProcessPool : a task whose worker was lost three times
     whatever `work` raises
     """
-    if not tasks:
-        return []
-    if cluster is not None:
-        return _on_cluster(work, tasks, done, cluster, patience_s)
-    if processes == 1 or len(tasks) == 1:
-        results = []
-        for task in tasks:
-            results.append(work(task))
-            done(len(results) / len(tasks))
-        return results
-    return _in_processes(work, tasks, processes, done)
+    results = dict(known or {})
+    left = [k for k in range(len(tasks)) if k not in results]
+
+    def take(number: int, result: Any) -> None:
+        results[number] = result
+        got(number, result)
+        done(len(results) / len(tasks))
+
+    if not left:
+        pass
+    elif cluster is not None:
+        _on_cluster(work, tasks, left, take, cluster, patience_s)
+    elif processes == 1 or len(left) == 1:
+        for k in left:
+            take(k, work(tasks[k]))
+    else:
+        _in_processes(work, tasks, left, take, processes)
+    return [results[k] for k in range(len(tasks))]
 
 
 @contextmanager
@@ -99,38 +111,43 @@ def _begin_worker() -> None:
     threading.Thread(target=follow, daemon=True).start()
 
 
-def _in_processes(work: Callable[[Any], Any], tasks: Sequence[Any], processes: int, done: Done) -> list[Any]:
-    results: dict[int, Any] = {}
+def _in_processes(
+    work: Callable[[Any], Any], tasks: Sequence[Any], left: list[int], take: Got, processes: int
+) -> None:
     for attempt in range(_ATTEMPTS):
-        left = [k for k in range(len(tasks)) if k not in results]
         if not left:
             break
+        lost: list[int] = []
+        failed: dict[int, BaseException] = {}
         with worker_processes(min(processes, len(left))) as pool:
-            futures: dict[int, Future[Any]] = {k: pool.submit(work, tasks[k]) for k in left}
-            for k, future in futures.items():
-                try:
-                    results[k] = future.result()
-                except BrokenProcessPool:
-                    if attempt == _ATTEMPTS - 1:
-                        raise
-                    continue
-                done(len(results) / len(tasks))
-    return [results[k] for k in range(len(tasks))]
+            futures: dict[Future[Any], int] = {pool.submit(work, tasks[k]): k for k in left}
+            # As they are done: what is done must not wait for a slower one before it is kept.
+            for future in as_completed(futures):
+                k, error = futures[future], future.exception()
+                if error is None:
+                    take(k, future.result())
+                elif isinstance(error, BrokenProcessPool) and attempt < _ATTEMPTS - 1:
+                    lost.append(k)
+                else:
+                    failed[k] = error
+                # Of several errors the first by its task, whichever came first.
+                if failed and all(f.done() for f, number in futures.items() if number < min(failed)):
+                    raise failed[min(failed)]
+        left = lost
 
 
 def _on_cluster(
-    work: Callable[[Any], Any], tasks: Sequence[Any], done: Done, address: str, patience_s: float
-) -> list[Any]:
+    work: Callable[[Any], Any], tasks: Sequence[Any], left: list[int], take: Got, address: str, patience_s: float
+) -> None:
     """The scheduler gives the tasks of a lost worker to another; one that killed its workers is asked for again."""
     client = connect(address, patience_s)
     from distributed import KilledWorker, wait
 
-    results: dict[int, Any] = {}
     with client, client.as_current():
         await_worker(client, address, patience_s)
-        asked = dict.fromkeys(range(len(tasks)), 1)
+        asked = dict.fromkeys(left, 1)
         # One by one, so that tasks need not be hashable, and none is taken for another (pure).
-        futures = {k: client.submit(work, task, pure=False) for k, task in enumerate(tasks)}
+        futures = {k: client.submit(work, tasks[k], pure=False) for k in left}
         while futures:
             try:
                 wait(list(futures.values()), timeout=patience_s, return_when="FIRST_COMPLETED")
@@ -139,15 +156,14 @@ def _on_cluster(
                 continue
             for k in [k for k, future in futures.items() if future.done()]:
                 try:
-                    results[k] = futures.pop(k).result()
+                    result = futures.pop(k).result()
                 except KilledWorker:
                     if asked[k] == _ATTEMPTS:
                         raise
                     asked[k] += 1
                     futures[k] = client.submit(work, tasks[k], pure=False)
                     continue
-                done(len(results) / len(tasks))
-    return [results[k] for k in range(len(tasks))]
+                take(k, result)
 
 
 def connect(address: str, patience_s: float) -> Client:

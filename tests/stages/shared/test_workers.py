@@ -81,6 +81,17 @@ def test_results_come_in_the_order_of_the_tasks(processes):
     assert compute(slow_square, [], processes) == []
 
 
+@pytest.mark.parametrize("processes", [1, 2])
+def test_what_is_known_is_not_done_again(processes):
+    told, got = [], {}
+    known = {0: "known", 3: "known too"}
+    results = compute(slow_square, TASKS, processes, told.append, known=known, got=got.__setitem__)
+    wanted = [known.get(k, v**2) for k, v in enumerate(TASKS)]
+    assert results == wanted and got == {k: v for k, v in enumerate(wanted) if k not in known}
+    assert told[0] == pytest.approx(3 / len(TASKS)) and told[-1] == 1.0
+    assert compute(fail, TASKS, processes, known=dict(enumerate(TASKS))) == list(TASKS)
+
+
 def test_a_killed_process_loses_nothing(tmp_path):
     tasks = [(tmp_path / "died", v) for v in TASKS]
     assert compute(die_once, tasks, 2) == [10 * v for v in TASKS]

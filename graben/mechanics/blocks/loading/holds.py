@@ -48,6 +48,8 @@ class Holds(Programme):
     def run(self) -> Iterator[Moment]:
         """Find the bracket; the last saved state is the failure from its lower end, where there is one."""
         m = self.model
+        if self._over_and_saved:
+            return
         if not self.load_times:
             m.begin_ledger()
             self.rise.load_time = self.low
@@ -79,8 +81,7 @@ class Holds(Programme):
                 self.rise.failed = True
                 break
             self._bring(kept)
-        if m.time > self._saved_at:
-            yield self._moment(save=True)
+        yield from self._last_moment()
 
     @property
     def narrow(self) -> bool:
@@ -165,9 +166,9 @@ class Holds(Programme):
     def _bring(self, kept: tuple[State, State]) -> None:
         """Back to where the body rested."""
         snapshot.bring_back(self.model, {name: values.copy() for name, values in kept[0].items()})
-        looks, saved, moments = self.looks, self._saved_at, self.load_times
+        looks, saved, moments, at_rest = self.looks, self._saved_at, self.load_times, self.at_rest
         super().bring_back({name: np.array(values) for name, values in kept[1].items()})
-        self.looks, self._saved_at, self.load_times = looks, saved, moments
+        self.looks, self._saved_at, self.load_times, self.at_rest = looks, saved, moments, at_rest
         if self.weaken:
             self.model.weaken(self.low)
         else:

@@ -63,6 +63,7 @@ class Programme:
         self.rise, self.falling, self.may_fall = Rise(), Falling(model), may_fall
         self.resistance, self.set_in = Resistance(model), set_in
         self.at_rest: bool | None = None
+        self._over_and_saved = False
         self.looks: list[tuple[float, ...]] = []
         self.first_look = 0
         self.load_times: list[float] = []
@@ -134,6 +135,8 @@ class Programme:
     def run(self) -> Iterator[Moment]:
         """Raise the loads and dig until failure or the end."""
         m, rise = self.model, self.rise
+        if self._over_and_saved:
+            return
         if not self.load_times:
             m.begin_ledger()
             yield self._moment(save=True)
@@ -152,7 +155,12 @@ class Programme:
             yield self._moment(save=rise.failed or end > rise.load_time >= self._next_save)
         if rise.load_time >= end and not rise.failed:
             yield from self._hold()
-        if m.time > self._saved_at:
+        yield from self._last_moment()
+
+    def _last_moment(self) -> Iterator[Moment]:
+        """The last saved state, from which a restart does not go on."""
+        if self.model.time > self._saved_at:
+            self._over_and_saved = True
             yield self._moment(save=True)
 
     def _hold(self) -> Iterator[Moment]:
@@ -349,6 +357,7 @@ class Programme:
             "next_save": np.array(self._next_save),
             "saved_at": np.array(self._saved_at),
             "dug": np.array(self._dug),
+            "ended": np.array([self._over_and_saved, -1 if self.at_rest is None else self.at_rest], dtype=np.int64),
             "released": np.array([released[:2] for released in self._released]).reshape(-1, 2),
             "released_forces": np.array([forces for _, _, forces in self._released]).reshape(-1, *self.carried.shape),
             **self.falling.state(),
@@ -370,6 +379,8 @@ class Programme:
         self.resistance.bring_back(self.model, state)
         self._next_save, self._saved_at = float(state["next_save"]), float(state["saved_at"])
         self._dug = int(state["dug"])
+        self._over_and_saved = bool(state["ended"][0])
+        self.at_rest = None if state["ended"][1] < 0 else bool(state["ended"][1])
         self.loads.take_off(self.model.removed[self.model.bodies.vertex_block])
         for (start, over), forces in zip(state["released"], state["released_forces"], strict=True):
             self._release(float(start), float(over), forces)
