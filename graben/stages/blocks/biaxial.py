@@ -130,7 +130,7 @@ class BiaxialReport:
         Its speed rises over the first steps, so speed times time is too much. displacement : (rock vertices, 2)
         """
         bodies = self.model.bodies
-        top = bodies.vertex_side[: len(displacement), rectangle_sides(bodies.outline).top]
+        top = bodies.vertex_side[bodies.vertex_block < bodies.rock, rectangle_sides(bodies.outline).top]
         return float(displacement[top, 1].mean())
 
     def _paced(self) -> dict[str, float]:

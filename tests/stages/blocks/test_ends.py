@@ -128,6 +128,10 @@ def test_the_artifact_holds_the_rock_alone(scene, settings):
     assert a.boundary_force.values.sum(axis=1) == pytest.approx(reaction.sum(axis=1), abs=1.0)
     assert reaction[:, sides.bottom, 1] == pytest.approx(-reaction[:, sides.top, 1], rel=1e-2)
     assert headline["bottom_over_top_reaction"] == pytest.approx(1.0, abs=2e-3)
+    # The rock's own top has moved by what the headline says, as far as rest has left it near 2 m.
+    moved = a.displacement.values[:, x[:, 1] > 1.999, 1].mean(axis=1) / 2.0
+    peak = int(np.argmax(np.abs(reaction[:, sides.top, 1])))
+    assert headline["strain_at_peak"] == pytest.approx(moved[peak], rel=0.05, abs=1e-5)
 
 
 def test_rough_platens_make_the_rock_stronger_and_say_so(scene):
