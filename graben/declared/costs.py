@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-YARDSTICK_S = 0.25
+YARDSTICK_S = 0.08
 """CPU time that the yardstick of graben.stages.explain.machine took where the costs below were measured."""
 
 
@@ -22,12 +22,12 @@ class Cost:
 
 
 COSTS: dict[str, Cost] = {
-    "blocks": Cost(3.0, 1.6e-7),
-    "particles": Cost(3.0, 1.5e-7),
-    "rev-study": Cost(3.0, 2e-2),
-    "calibrate": Cost(3.0, 1e-6),
-    "fem": Cost(4.0, 1e-4),
-    "scratch": Cost(3.0, 2e-7),
-    "wear": Cost(1.5, 0.0),
+    "blocks": Cost(4.5, 8.3e-9, 1.1),
+    "particles": Cost(1.2, 4.5e-7),
+    "rev-study": Cost(1.5, 2e-2),
+    "calibrate": Cost(2.5, 9e-7),
+    "fem": Cost(1.2, 4.8e-7, 1.3),
+    "scratch": Cost(1.0, 6.9e-7),
+    "wear": Cost(0.4, 0.0),
 }
-"""By kind of scene."""
+"""By kind of scene: from the studies of fidelity in docs/studies/tradeoffs.md, within a third of each run there."""

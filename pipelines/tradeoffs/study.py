@@ -2,7 +2,7 @@
 
     python pipelines/tradeoffs/study.py RESULTS                      # all studies, and the page in docs/studies
     python pipelines/tradeoffs/study.py RESULTS --promises           # those of fidelity; exit code 1: one is broken
-    python pipelines/tradeoffs/study.py RESULTS --only fem           # those whose name begins so
+    python pipelines/tradeoffs/study.py RESULTS --only fem blocks    # those whose names begin so
 
 Each study is one call of `graben tradeoff`; what is done is not done again.
 """

@@ -282,7 +282,11 @@ def test_arrays_that_do_not_fit_are_refused_before_anything_uses_them(case, tmp_
 @pytest.mark.parametrize(
     ("place", "error", "left"),
     [
-        ("graben.schemas.artifact.write_netcdf", OSError(errno.ENOSPC, "No space left on device"), ["out.checkpoint.npz"]),
+        (
+            "graben.schemas.artifact.write_netcdf",
+            OSError(errno.ENOSPC, "No space left on device"),
+            ["out.checkpoint.npz"],
+        ),
         ("graben.schemas.files.os.replace", OSError(errno.EROFS, "Read-only file system"), []),
     ],
 )

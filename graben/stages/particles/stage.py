@@ -232,6 +232,8 @@ def _sizes(scene: ParticlesScene, law: LinearLaw, recipe: BedRecipe) -> list[Est
     seconds = math.sqrt(2.0 * height / recipe.gravity)
     if recipe.shakes:
         seconds += recipe.shakes / recipe.shake_frequency
+    # A bed settles by decades of kinetic energy: twice as long from a ten-thousandth as from a hundredth.
+    seconds *= max(1.0, 0.5 * math.log10(1.0 / recipe.rest))
     steps = seconds / (recipe.safety * critical_step(law))
     return [
         Estimate("grains", grains * scene.beds, grains * scene.beds * _GRAIN_BYTES, key, value),

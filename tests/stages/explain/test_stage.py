@@ -48,10 +48,15 @@ def test_time_is_start_and_work():
 
 
 def test_what_makes_a_run_dearer_comes_first():
+    growth = COSTS["blocks"].growth
     found = stage.run({"kind": "blocks", "numerics": {"steps": 10_000_000}})
     keys = {row["key"]: row for row in found["keys"]}
-    assert keys["tessellation.edge"]["to"] == "0.25 m" and keys["tessellation.edge"]["cost"] == pytest.approx(4, 0.1)
-    assert keys["numerics.steps"]["to"] == "20000000" and keys["numerics.steps"]["cost"] == pytest.approx(2, 0.05)
+    assert keys["tessellation.edge"]["to"] == "0.25 m" and keys["tessellation.edge"]["cost"] == pytest.approx(
+        4**growth, 0.1
+    )
+    assert keys["numerics.steps"]["to"] == "20000000" and keys["numerics.steps"]["cost"] == pytest.approx(
+        2**growth, 0.05
+    )
     costs = [row["cost"] for row in found["keys"]]
     assert costs == sorted(costs, reverse=True) and min(costs) > 1.05
 
