@@ -26,9 +26,10 @@ what that costs. `make verify-promises` holds them against runs ([study](../stud
 homogenize and wear-estimate have no knob of accuracy.
 """
 NOTES = {
-    "particles": "A bed costs 1, 3 and 11 at draft, standard and reference ([study](../studies/beds.md)).",
-    "blocks": "Draft blocks are still too strong ([study](../studies/blocks-fidelity.md)).",
-    "scratch": "A scratch costs 1, 10 and about 60 ([study](../studies/scratch.md)).",
+    "blocks": "More: [steps, damping, rounding](../studies/blocks-fidelity.md).",
+    "particles": "More: [beds](../studies/beds.md).",
+    "fem": "The slope of the pipeline softens: its load falls with the mesh ([study](../studies/slope-mesh.md)).",
+    "scratch": "More: [scratch](../studies/scratch.md).",
 }
 
 

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from runpy import run_path
 
 import pytest
 
@@ -11,6 +12,7 @@ from graben.schemas.scene import load_scene
 from graben.stages.tradeoff.knobs import grid, knobs_of
 from tests.conftest import PIPELINES
 
+held = run_path(str(PIPELINES / "tradeoffs" / "study.py"), run_name="study")["_held"]
 PLAN = tomllib.loads((PIPELINES / "tradeoffs" / "studies.toml").read_text(encoding="utf-8"))
 
 
@@ -34,3 +36,18 @@ def test_every_stage_with_knobs_has_a_study_of_its_fidelities():
 
 def test_promises_have_one_entry_a_fidelity():
     assert all(len(s.promises) in (0, len(FIDELITIES)) for s in STAGES)
+
+
+def seen(errors):
+    rows = zip(FIDELITIES, errors, (2.0, 4.0, 16.0))
+    return {"points": [{"knobs": {"fidelity": f}, "error": e, "cpu_s": c} for f, e, c in rows]}
+
+
+@pytest.mark.parametrize(("draft", "code"), [(0.05, 0), (-0.05, 0), (0.07, 1), (-0.07, 1), (None, 0)])
+def test_a_broken_promise_is_told(draft, code, capsys):
+    promised = stage_of("scratch").promises
+    assert promised[0].error == 0.06 and promised[2].error is None
+    study = {"name": "scratch-fidelity", "promise": "scratch"}
+    assert held([study], {"scratch-fidelity": seen([draft, 0.01, None])}) == code
+    said = capsys.readouterr().out
+    assert ("BROKEN" in said) == bool(code) and "promised    6 %" in said and "cost 8.0" in said
