@@ -24,8 +24,6 @@ from graben.declared.knobs import FIDELITIES, stage_of
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 BIN = Path(sys.executable).parent
-# A number that repeats within this may differ by it from what is promised.
-SLACK = 1.0
 
 
 def main() -> int:
@@ -101,11 +99,11 @@ def _held(studies: list[dict[str, Any]], found: dict[str, dict[str, Any]]) -> in
             cost = point["cpu_s"] / points["draft"]["cpu_s"]
             seen = None if point["error"] is None else abs(point["error"])
             kept = "no promise"
-            if promise is not None and promise.error is not None and seen is not None:
-                kept = "kept" if seen <= SLACK * promise.error else "BROKEN"
+            if promise is not None and promise.error is not None:
+                kept = "kept" if seen is not None and seen <= promise.error else "BROKEN"
                 broken += kept == "BROKEN"
             asked = "none" if promise is None or promise.error is None else f"{100 * promise.error:.3g} %"
-            told = "its own error is not known" if seen is None else f"{100 * seen:.3g} %"
+            told = "no error" if seen is None else f"{100 * seen:.3g} %"
             print(f"{stage.kind:10} {fidelity:10} promised {asked:>7}, seen {told}, cost {cost:.1f}: {kept}")
     return 1 if broken else 0
 

@@ -43,11 +43,11 @@ def seen(errors):
     return {"points": [{"knobs": {"fidelity": f}, "error": e, "cpu_s": c} for f, e, c in rows]}
 
 
-@pytest.mark.parametrize(("draft", "code"), [(0.05, 0), (-0.05, 0), (0.07, 1), (-0.07, 1), (None, 0)])
+@pytest.mark.parametrize(("draft", "code"), [(0.05, 0), (-0.05, 0), (0.07, 1), (-0.07, 1), (None, 1)])
 def test_a_broken_promise_is_told(draft, code, capsys):
     promised = stage_of("scratch").promises
     assert promised[0].error == 0.06 and promised[2].error is None
     study = {"name": "scratch-fidelity", "promise": "scratch"}
     assert held([study], {"scratch-fidelity": seen([draft, 0.01, None])}) == code
     said = capsys.readouterr().out
-    assert ("BROKEN" in said) == bool(code) and "promised    6 %" in said and "cost 8.0" in said
+    assert ("BROKEN" in said) == bool(code) and "promised     6 %" in said and "cost 8.0" in said
