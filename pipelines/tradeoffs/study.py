@@ -30,7 +30,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("results", type=Path)
     parser.add_argument("--promises", action="store_true")
-    parser.add_argument("--only", default="")
+    parser.add_argument("--only", nargs="+", default=[""])
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--page", type=Path)
     args = parser.parse_args()
@@ -38,7 +38,9 @@ def main() -> int:
     folder = args.results / "tradeoffs"
     folder.mkdir(parents=True, exist_ok=True)
     chosen = [
-        s for s in plan["studies"] if s["name"].startswith(args.only) and (s.get("promise") or not args.promises)
+        s
+        for s in plan["studies"]
+        if s["name"].startswith(tuple(args.only)) and (s.get("promise") or not args.promises)
     ]
     if not chosen:
         print(f"no study {args.only!r}", file=sys.stderr)
@@ -51,7 +53,7 @@ def main() -> int:
                 _make(folder, runs[name[1:]])
         found[study["name"]] = _study(folder, study, args.processes)
     if args.page is not None:
-        _write(args.page, folder, chosen, found)
+        _write(args.page, folder, chosen, found, [s["name"] for s in plan["studies"] if s not in chosen])
     return _held(chosen, found)
 
 
@@ -108,7 +110,9 @@ def _held(studies: list[dict[str, Any]], found: dict[str, dict[str, Any]]) -> in
     return 1 if broken else 0
 
 
-def _write(page: Path, folder: Path, studies: list[dict[str, Any]], found: dict[str, dict[str, Any]]) -> None:
+def _write(
+    page: Path, folder: Path, studies: list[dict[str, Any]], found: dict[str, dict[str, Any]], left: list[str]
+) -> None:
     commit = subprocess.run(
         ["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True, text=True
     ).stdout
@@ -116,8 +120,7 @@ def _write(page: Path, folder: Path, studies: list[dict[str, Any]], found: dict[
         "# What accuracy costs",
         "",
         f"Measured {datetime.date.today()} at commit {commit.strip() or '(none)'}, two runs at a time, on",
-        f"{_machine()}.",
-        "Made by `make tradeoffs`; this page is written by it.",
+        f"{_machine()}. This page is written by `make tradeoffs`.",
         "",
         "```",
         "make tradeoffs            # every study below, from pipelines/tradeoffs/studies.toml",
@@ -136,7 +139,9 @@ def _write(page: Path, folder: Path, studies: list[dict[str, Any]], found: dict[
         lines += ["", f"## {study['name']}", "", *_about(study, said), "", *_table(said), ""]
         lines += [f"![{study['name']}](../images/tradeoffs/{study['name']}.png)"]
         if said["warnings"]:
-            lines += [""] + [f"- {text}" for text in said["warnings"]]
+            lines += ["", "```", *said["warnings"], "```"]
+    if left:
+        lines += ["", "## Not made here", "", *(f"- `{name}`" for name in left)]
     page.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -57,6 +57,8 @@ def drawn(artifact: Path, form: str) -> bytes:
     if warnings and stopped is None:
         more = f" (and {len(warnings) - 1} more)" if len(warnings) > 1 else ""
         figure.text(0.01, 0.005, f"warning: {warnings[0][:150]}{more}", fontsize=7, color="firebrick")
+    if stopped is not None or warnings:
+        figure.get_layout_engine().set(rect=(0.0, 0.03, 1.0, 0.97))  # type: ignore[union-attr, call-arg]
     picture = io.BytesIO()
     try:
         drawer.draw(dataset, figure)
