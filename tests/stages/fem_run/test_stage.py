@@ -271,7 +271,7 @@ def test_a_bad_material_file_is_named(tmp_path):
     assert "a.material.toml" in result.output and "young_modulus" in result.output
 
 
-def test_an_interrupted_run_leaves_no_output(tmp_path, monkeypatch):
+def test_an_interrupted_run_leaves_a_checkpoint_and_no_output(tmp_path, monkeypatch):
     (tmp_path / "run.toml").write_text(SCENE)
     calls = []
 
@@ -282,7 +282,7 @@ def test_an_interrupted_run_leaves_no_output(tmp_path, monkeypatch):
 
     with pytest.raises(KeyboardInterrupt):
         fem_run.run(tmp_path / "run.toml", tmp_path / "run.nc", progress=interrupt)
-    assert [p.name for p in tmp_path.iterdir()] == ["run.toml"]
+    assert {p.name for p in tmp_path.iterdir()} == {"run.toml", "run.checkpoint.npz"}
 
 
 def test_the_slope_of_the_pipeline_is_a_good_scene(tmp_path):
