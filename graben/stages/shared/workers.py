@@ -118,21 +118,26 @@ def _in_processes(
         if not left:
             break
         lost: list[int] = []
-        failed: dict[int, BaseException] = {}
+        first = len(tasks)  # task of the first error that was seen
         with worker_processes(min(processes, len(left))) as pool:
             futures: dict[Future[Any], int] = {pool.submit(work, tasks[k]): k for k in left}
+            again = BrokenProcessPool if attempt < _ATTEMPTS - 1 else ()
             # As they are done: what is done must not wait for a slower one before it is kept.
             for future in as_completed(futures):
                 k, error = futures[future], future.exception()
                 if error is None:
                     take(k, future.result())
-                elif isinstance(error, BrokenProcessPool) and attempt < _ATTEMPTS - 1:
+                elif isinstance(error, again):
                     lost.append(k)
                 else:
-                    failed[k] = error
-                # Of several errors the first by its task, whichever came first.
-                if failed and all(f.done() for f, number in futures.items() if number < min(failed)):
-                    raise failed[min(failed)]
+                    first = min(first, k)
+                # Of several errors the first by its task, whichever came first: also one that is not yet told here.
+                if first == len(tasks):
+                    continue
+                earlier = [f for f, number in futures.items() if number <= first]
+                if all(f.done() for f in earlier):
+                    errors = (f.exception() for f in earlier)
+                    raise next(e for e in errors if e is not None and not isinstance(e, again))
         left = lost
 
 

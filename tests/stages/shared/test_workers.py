@@ -3,10 +3,12 @@
 import os
 import sys
 import time
+from concurrent.futures import wait
 
 import pytest
 
 from graben.errors import BadInput, Fault, NumericsFailed
+from graben.stages.shared import workers
 from graben.stages.shared.workers import compute
 
 TASKS = list(range(6))
@@ -104,6 +106,16 @@ def test_what_the_work_raises_comes_through(processes):
         compute(refuse, TASKS, processes)
     with pytest.raises(NumericsFailed, match="element 0"):
         compute(fail, TASKS, processes)
+
+
+def test_of_several_errors_the_first_by_its_task_comes_through_whichever_is_told_first(monkeypatch):
+    def last_first(futures):
+        wait(futures)
+        return reversed(list(futures))
+
+    monkeypatch.setattr(workers, "as_completed", last_first)
+    with pytest.raises(NumericsFailed, match="element 0"):
+        compute(fail, TASKS, 2)
 
 
 def test_a_cluster_gives_the_same_in_the_same_order(cluster):
