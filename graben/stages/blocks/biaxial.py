@@ -44,8 +44,9 @@ def biaxial(scene: BlocksScene, model: BlockModel, steps: int) -> Biaxial:
 
 def _refuse_crushed(scene: BlocksScene, model: BlockModel) -> None:
     """BadInput where consolidation alone presses blocks through one another: a run would stop in its first steps."""
-    loading, joints = scene.loading, model.joints
-    if len(model.bodies.block_area) < 2 or any(j.closure > 0.0 for j in joints):
+    # Contacts with platens have a face, and a stiffness of their own.
+    loading, joints = scene.loading, [j for j in model.joints if j.face == 0]
+    if model.bodies.rock < 2 or any(j.closure > 0.0 for j in joints):
         return
     stiffness, sides = max(j.normal_stiffness for j in joints), max(1.0, loading.vertical_ratio)
     most = stiffness * model.deepest / sides

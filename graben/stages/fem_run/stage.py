@@ -258,7 +258,7 @@ def _headline(scene: FemScene, problem: Problem, settled: March, loaded: March, 
         reason = f"no equilibrium was found beyond the last load, but that is no collapse: {still}; {reason}"
     return {
         "failure_load_pa": carried if failed and known and collapsed else None,
-        "last_load_pa": carried,
+        "last_load_pa": curve.carried[-1],
         "failed": failed,
         "largest_load_pa": problem.pressure.at(loaded.time),
         "settlement_m": curve.settlement[-1],

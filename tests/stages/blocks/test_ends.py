@@ -140,3 +140,10 @@ def test_rough_platens_make_the_rock_stronger_and_say_so(scene):
     assert rough["friction_over_confinement"] > 0.1
     assert abs(smooth["friction_over_confinement"]) < 1e-3
     assert -rough["peak_wall_stress_pa"] > -1.05 * smooth["peak_wall_stress_pa"]
+
+
+def test_stiff_platens_do_not_hide_a_confinement_that_closes_the_joints(scene):
+    settings = ['loading.confining_pressure="1 GPa"', 'loading.platens={normal_stiffness="1e4 GPa/m"}']
+    for chosen in (settings[:1], settings):
+        with pytest.raises(BadInput, match=r"it closes joints of 1e\+10 Pa/m"):
+            dem_run.run(scene, scene.with_suffix(".nc"), overrides=chosen)

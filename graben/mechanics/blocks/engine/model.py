@@ -106,7 +106,7 @@ class BlockModel(DrivenModel):
         self.excavated = 0.0
         self.weight = self.true_mass[:, None] * np.asarray(gravity, dtype=float)[None, :]
         self.skeleton = setup.unloaded(self.skin, self.parts, made, self.weight)
-        size = float(np.sqrt(np.median(bodies.block_area)))
+        size = float(np.sqrt(np.median(bodies.block_area[: bodies.rock])))
         self.block_size = size
         self.reach = 0.08 * size
         self.near = 0.002 * size

@@ -15,7 +15,7 @@ PLAIN = Joint(1e10, 1e9, 0.6, 1e5, 0.0, 0.05, np.inf)
 FULL = PLAIN._replace(tension=1e5, residual_friction=0.5, residual_cohesion=0.0, closure=1e-3)
 
 
-@pytest.mark.parametrize("joint", [PLAIN, FULL])
+@pytest.mark.parametrize("joint", [PLAIN, FULL, PLAIN._replace(face=1), FULL._replace(face=2)])
 def test_a_batch_gives_bitwise_what_its_rows_give_alone(joint):
     bodies = build_bodies(voronoi_blocks(SQUARE, 0.5, seed=1))
     model = BlockModel(bodies, young=65e9, poisson=0.2, density=2700.0, joint=joint, rounding=0.05, dt=2e-3)
