@@ -45,6 +45,7 @@ def within(
     command: Sequence[Any],
     inputs: Sequence[Path],
     overrides: Sequence[str],
+    restart: bool = False,
 ) -> tuple[tuple[str, ...], Told]:
     """Overrides with the fidelity that fits, and what adds cost and choice to the headline numbers.
 
@@ -52,6 +53,8 @@ def within(
     """
     if budget is None:
         return tuple(overrides), lambda headline: headline
+    if restart:
+        raise click.UsageError("--restart keeps the fidelity of the stopped run: --set fidelity=..., no --budget")
     from graben.stages.explain.budget import choose
 
     settings = [part for text in overrides for part in ("--set", text)]

@@ -52,7 +52,9 @@ def main(
     from graben.stages.calibrate import stage as calibrate
 
     others = [*options_of("--validate", validate), *options_of("--compare", compare)]
-    overrides, told = within(session, budget, scene, ["calibrate", scene, *curves, *others], curves, overrides)
+    overrides, told = within(
+        session, budget, scene, ["calibrate", scene, *curves, *others], curves, overrides, restart
+    )
     with session.progress() as progress:
         headline = calibrate.run(
             scene,

@@ -31,7 +31,7 @@ def main(
     """
     from graben.stages.dem_run import stage as dem_run
 
-    overrides, told = within(session, budget, scene, ["dem-run", scene], [], overrides)
+    overrides, told = within(session, budget, scene, ["dem-run", scene], [], overrides, restart)
     with session.progress() as progress:
         headline = dem_run.run(
             scene, output, overrides=overrides, overwrite=overwrite, restart=restart, progress=progress

@@ -39,7 +39,7 @@ def main(
     from graben.stages.fem_run import stage as fem_run
 
     command = ["fem-run", scene, *options_of("--material", [material])]
-    overrides, told = within(session, budget, scene, command, [], overrides)
+    overrides, told = within(session, budget, scene, command, [material] if material else [], overrides, restart)
     with session.progress() as progress:
         headline = fem_run.run(
             scene,

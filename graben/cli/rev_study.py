@@ -67,7 +67,7 @@ def main(
         short.append(f"processes={processes}")
     study = load_scene(scene, "rev-study", short) if scene else default_scene("rev-study", short)
     command = ["rev-study", *inputs, *options_of("--scene", [scene])]
-    more, told = within(session, budget, scene or study, command, inputs, short)
+    more, told = within(session, budget, scene or study, command, inputs, short, restart)
     study = load_scene(study, "rev-study", more[len(short) :])
     with session.progress() as progress:
         headline = rev_study.run(

@@ -40,7 +40,7 @@ def main(
     from graben.stages.scratch import stage as scratch
 
     command = ["scratch", scene, *options_of("--material", [material])]
-    overrides, told = within(session, budget, scene, command, [], overrides)
+    overrides, told = within(session, budget, scene, command, [material] if material else [], overrides, restart)
     with session.progress() as progress:
         headline = scratch.run(
             scene,

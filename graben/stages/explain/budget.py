@@ -5,6 +5,7 @@ What a scene costs beyond its estimate is seen from a run of it at draft, made f
 
 from __future__ import annotations
 
+import math
 import tempfile
 import time
 from collections.abc import Sequence
@@ -76,32 +77,42 @@ def choose(
         raise BadInput(Fault("", "budget", f"{budget:g} s", expected, True))
     slow = slowness()
     times = {f: slow * _cpu(read, inputs, f) for f in FIDELITIES}
-    if times["draft"] > budget:
-        expected = f"at least {times['draft']:.3g} s, in which this scene runs at draft"
+    ratio = None
+    if times["draft"] <= _PILOT * budget:
+        start = slow * COSTS[read.kind].start
+        ratio = _pilot(command, start, times["draft"], 0.5 * budget)
+        if ratio is not None:
+            times = {f: start + ratio * (t - start) for f, t in times.items()}
+    tried, spent = ratio is not None, time.monotonic() - begun
+    fits = [f for f in FIDELITIES if spent + times[f] <= budget]
+    if not fits:
+        expected = f"at least {spent + times['draft']:.3g} s, in which this scene runs at draft"
         raise BadInput(Fault("", "budget", f"{budget:g} s", expected, True))
-    tried = times["draft"] <= _PILOT * budget
-    if tried:
-        start = slow * size_start(read.kind)
-        ratio = _pilot(command, start, times["draft"])
-        times = {f: start + ratio * (t - start) for f, t in times.items()}
-    spent = time.monotonic() - begun
-    best = ([f for f in FIDELITIES if spent + times[f] <= budget] or ["draft"])[-1]
+    best = fits[-1]
     return Choice(best, spent + times[best], promise_at(read.kind, best).error, tried, budget, begun)
 
 
-def size_start(kind: str) -> float:
-    """CPU time before the first step [s], on the machine of the costs."""
-    return COSTS[kind].start
-
-
 def _cpu(scene: Any, inputs: Sequence[Path], fidelity: Fidelity) -> float:
-    return size_of(load_scene(scene, scene.kind, {"fidelity": fidelity}), inputs).cpu
+    """CPU time at a fidelity [s], on the machine of the costs; infinite where no machine bears it."""
+    try:
+        size = size_of(load_scene(scene, scene.kind, {"fidelity": fidelity}), inputs)
+    except BadInput:
+        if fidelity == "draft":
+            raise
+        return math.inf
+    if not size.complete:
+        expected = "no budget: what this run takes is not known before it is made (see graben explain)"
+        raise BadInput(Fault("", "budget", "", expected, True))
+    return size.cpu
 
 
-def _pilot(command: Sequence[str], start: float, predicted: float) -> float:
-    """Time of a run at draft over the one predicted, both without the start; 1 where it fails."""
+def _pilot(command: Sequence[str], start: float, predicted: float, limit: float) -> float | None:
+    """Time of a run at draft over the one predicted, both without the start; None where it fails.
+
+    limit : by the clock [s]; a run that takes longer counts with that time
+    """
     with tempfile.TemporaryDirectory(prefix="graben-") as folder:
-        found = measured([*command, "--set", "fidelity=draft"], Path(folder))
-    if found.code != 0 or predicted <= start:
-        return 1.0
+        found = measured([*command, "--set", "fidelity=draft"], Path(folder), limit)
+    if (found.code != 0 and found.wall_s < limit) or predicted <= start:
+        return None
     return max(0.1, (found.wall_s - start) / (predicted - start))

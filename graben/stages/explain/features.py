@@ -22,9 +22,14 @@ def _never(text: str) -> Feature:
     return Feature(lambda scene: False, "", text)
 
 
+def _of_joints(scene: Any, *keys: str) -> bool:
+    """Whether joints, of any set, have one of these above nothing."""
+    return any(getattr(j, key) for key in keys for j in (scene.joints, *scene.joints.sets))
+
+
 def _broken(scene: Any) -> bool:
-    return any(j.residual_friction is not None or j.residual_cohesion is not None
-               for j in (scene.joints, *scene.joints.sets))  # fmt: skip
+    keys = ("residual_friction", "residual_cohesion")
+    return any(getattr(j, key) is not None for key in keys for j in (scene.joints, *scene.joints.sets))
 
 
 def _table(scene: Any, key: str) -> Any:
@@ -39,11 +44,11 @@ FEATURES: dict[str, tuple[Feature, ...]] = {
                 "yield of the rock between joints"),
         Feature(lambda s: s.rock.zones != "rigid", "", "deformation of the blocks: they are rigid"),
         _always("joints slip by Coulomb's law, open and close, with moments over their length"),
-        Feature(lambda s: any(j.dilation for j in (s.joints, *s.joints.sets)), "joints dilate as they slip",
+        Feature(lambda s: _of_joints(s, "dilation"), "joints dilate as they slip",
                 "dilation of joints"),
-        Feature(lambda s: s.joints.tension, "joints bear tension until they break", "tensile strength of joints"),
+        Feature(lambda s: _of_joints(s, "tension"), "joints bear tension until they break", "tensile strength of joints"),
         Feature(_broken, "joints keep a residual strength once broken", "loss of strength of joints that slip"),
-        Feature(lambda s: s.joints.closure, "joints stiffen as they close", "stiffening of joints as they close"),
+        Feature(lambda s: _of_joints(s, "closure"), "joints stiffen as they close", "stiffening of joints as they close"),
         Feature(lambda s: s.in_situ, "stress in situ, in balance from the start", "stress in situ"),
         Feature(lambda s: s.programme, "weight, pressures that rise until the body fails or rests",
                 "weight"),

@@ -58,6 +58,8 @@ def _read(path: Path | None) -> dict[str, float]:
         found = json.loads(path.read_text(encoding="utf-8")) if path is not None else {}
     except (OSError, ValueError):
         return {}
+    if not isinstance(found, dict):
+        return {}
     return {k: float(v) for k, v in found.items() if isinstance(v, int | float) and 0.0 < v < 1e3}
 
 

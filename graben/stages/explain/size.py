@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from graben.declared.costs import COSTS
-from graben.errors import Incomplete
-from graben.stages.shared.estimate import Estimate
+from graben.errors import Fault, Incomplete
+from graben.stages.shared.estimate import Estimate, refuse_too_large
 
 # Python and the libraries, before a scene is read.
 _LIBRARIES_BYTES = 2.5e8
@@ -51,11 +51,16 @@ def size_of(scene: Any, inputs: Sequence[Path] = ()) -> Size:
     )  # fmt: skip
 
 
+def _bearable(scene: Any, estimates: list[Estimate]) -> list[Estimate]:
+    refuse_too_large(scene.source.path, estimates)
+    return estimates
+
+
 def _blocks(scene: Any, inputs: list[Path]) -> list[Estimate]:
     from graben.stages.blocks.extent import extent_of, map_of
     from graben.stages.blocks.sizes import sizes_of
 
-    return sizes_of(scene, extent_of(scene, map_of(scene)))
+    return _bearable(scene, sizes_of(scene, extent_of(scene, map_of(scene))))
 
 
 def _particles(scene: Any, inputs: list[Path]) -> list[Estimate]:
@@ -67,7 +72,11 @@ def _particles(scene: Any, inputs: list[Path]) -> list[Estimate]:
 def _rev_study(scene: Any, inputs: list[Path]) -> list[Estimate]:
     from graben.stages.rev_study.stage import prepare
 
-    return prepare(scene, max(1, len(inputs)))[1][:1]
+    estimates = prepare(scene, max(1, len(inputs)))[1][:1]
+    if scene.calibration is not None:
+        # What its fits take depends on the law and on the curves of the runs.
+        raise Incomplete([Fault(str(scene.source.path), "calibration", "", "a study without fits, to know its time")])
+    return estimates
 
 
 def _calibrate(scene: Any, inputs: list[Path]) -> list[Estimate]:
@@ -77,15 +86,18 @@ def _calibrate(scene: Any, inputs: list[Path]) -> list[Estimate]:
 
 
 def _fem(scene: Any, inputs: list[Path]) -> list[Estimate]:
+    from graben.stages.fem_run.mesh import mesh_of
     from graben.stages.fem_run.sizes import sizes_of
 
-    return sizes_of(scene)
+    if scene.mesh.method == "file":
+        return _bearable(scene, sizes_of(scene, len(mesh_of(scene)[0].quads)))
+    return _bearable(scene, sizes_of(scene))
 
 
 def _scratch(scene: Any, inputs: list[Path]) -> list[Estimate]:
     from graben.stages.scratch.stage import prepare
 
-    return prepare(scene)[3]
+    return prepare(scene, inputs[0] if inputs else None)[3]
 
 
 def _wear(scene: Any, inputs: list[Path]) -> list[Estimate]:

@@ -71,11 +71,12 @@ def run(given: Given, inputs: Sequence[Path] = (), *, overrides: Overrides = ())
 @contextmanager
 def _quiet() -> Iterator[None]:
     """What was said of the inputs once is not said again."""
+    before = logging.root.manager.disable
     logging.disable(logging.WARNING)
     try:
         yield
     finally:
-        logging.disable(logging.NOTSET)
+        logging.disable(before)
 
 
 def promise_at(kind: str, fidelity: Fidelity) -> Promise:

@@ -17,6 +17,8 @@ def main() -> None:
     child = os.fork()
     if child == 0:
         os.execv(command[0], command)
+    # Ctrl-C reaches the child as well: its end is told, whatever it is.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: os.kill(child, signal.SIGTERM))
     _, status, used = os.wait4(child, 0)
     found = {

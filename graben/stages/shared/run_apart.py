@@ -26,14 +26,20 @@ class Run:
     peak_memory_bytes: int
 
 
-def measured(arguments: Sequence[str], folder: Path) -> Run:
-    """Run `graben ARGUMENTS...`, with its output in a folder that exists; workers count, its parent does not."""
+def measured(arguments: Sequence[str], folder: Path, limit: float | None = None) -> Run:
+    """Run `graben ARGUMENTS...`, with its output in a folder that exists; workers count, its parent does not.
+
+    limit : it is ended after so long, by the clock [s]
+    """
     command = [sys.executable, "-c", _START, *arguments, "--json", "-q", "-o", str(folder / "run.nc")]
     # -I -S: the launcher reads no site packages and stays small.
     launcher = [sys.executable, "-I", "-S", str(Path(__file__).with_name("launch.py")), str(folder / "cost.json")]
     with (folder / "out").open("wb") as out, (folder / "err").open("wb") as err:
         process = subprocess.Popen([*launcher, *command], stdin=subprocess.DEVNULL, stdout=out, stderr=err)
         try:
+            process.wait(limit)
+        except subprocess.TimeoutExpired:
+            process.terminate()
             process.wait()
         except BaseException:
             process.terminate()

@@ -9,10 +9,13 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import graben
 from graben.schemas.files import whole_file
 from graben.schemas.provenance import sha256_of
+from graben.stages.shared.checkpoint import build
 from graben.stages.shared.run_apart import Run, measured
+
+# What a command says where it is the numerics that failed, not the machine.
+_NUMERICS = "the numerics failed"
 
 
 @dataclass(frozen=True)
@@ -28,18 +31,9 @@ class Task:
 
 
 def name_of(arguments: Sequence[str], files: Sequence[Path]) -> str:
-    """A name that changes with the arguments, with what the files hold, and with graben itself."""
-    parts = [*arguments, *(sha256_of(f) for f in files), _version()]
+    """A name that changes with the arguments, with what the files hold, and with graben and its libraries."""
+    parts = [*arguments, *(sha256_of(f) for f in files), build()]
     return hashlib.sha256("\0".join(parts).encode(errors="surrogateescape")).hexdigest()[:20]
-
-
-def _version() -> str:
-    """A digest of the sources: a run of other code is another run."""
-    root = Path(graben.__file__).parent
-    digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
 
 
 def kept(task: Task) -> Run | None:
@@ -57,7 +51,7 @@ def make(task: Task) -> Run:
         return found
     with tempfile.TemporaryDirectory(prefix="graben-") as folder:
         found = measured(task.arguments, Path(folder))
-    if found.code != 130:  # what was interrupted gave nothing
+    if found.code == 0 or (found.code == 3 and _NUMERICS in found.said):  # else another try may go better
         with whole_file(task.folder / f"{task.name}.json") as temporary:
             temporary.write_text(json.dumps(asdict(found), indent=1), encoding="utf-8")
     return found

@@ -13,7 +13,7 @@ from graben.errors import BadInput, Fault, NumericsFailed
 from graben.schemas.artifact import write_artifact
 from graben.schemas.kinds import SCENES
 from graben.schemas.layouts.tradeoff import LAYOUT
-from graben.schemas.outputs import Outputs
+from graben.schemas.outputs import Outputs, files_of
 from graben.schemas.scene import load_scene
 from graben.stages.shared.last_good import keeps_last_good
 from graben.stages.shared.record import Progress, Record, silent
@@ -95,8 +95,13 @@ def run(
     """
     grid_knobs = knobs_of(knobs)
     points = grid(grid_knobs)
-    command, seed = _checked(scene, points, overrides, seeds)
-    files = [scene, *(Path(i) for i in inputs if Path(i).is_file())]
+    if reference is not None and not (np.isfinite(reference) and reference):
+        raise BadInput(Fault("", "reference", f"{reference:g}", "a finite number other than 0", True))
+    # A worker of a cluster may stand in another folder.
+    scene, output = scene.absolute(), output.absolute()
+    inputs = [str(Path(i).absolute()) if Path(i).is_file() else i for i in inputs]
+    command, seed, named = _checked(scene, points, overrides, seeds)
+    files = list(dict.fromkeys([scene, *(Path(i) for i in inputs if Path(i).is_file()), *named]))
     Outputs(output, kept=()).claim(files, overwrite=overwrite)
     record = Record.begin(inputs=files)
     folder = output.parent / (output.name.removesuffix(".nc") + RUNS)
@@ -108,7 +113,7 @@ def run(
     ]
     runs = _made(tasks, quantity, processes, cluster, progress)
     table = [runs[i : i + len(every)] for i in range(0, len(runs), len(every))]
-    value, low, high = (_numbers(table, name) for name in _names(quantity))
+    value, low, high = (_numbers(table, names) for names in _names(quantity))
     base = _reference(reference, value, low, high, grid_knobs)
     found = errors_of(value, base.value, base.low, base.high, low[:, 0], high[:, 0])
     if base.origin == "finest":
@@ -142,14 +147,17 @@ def run(
     }  # fmt: skip
 
 
-def _checked(scene: Path, points: Sequence[dict[str, str]], overrides: Sequence[str], seeds: int) -> tuple[str, int]:
-    """The command of a scene, and its seed, once it was read with the values of each point."""
+def _checked(
+    scene: Path, points: Sequence[dict[str, str]], overrides: Sequence[str], seeds: int
+) -> tuple[str, int, list[Path]]:
+    """The command of a scene, its seed and the files that it names, read with the values of each point."""
     if scene.suffix == ".nc":
         if seeds > 1 or overrides:
             raise BadInput(Fault(str(scene), "", "", "a scene: an artifact is averaged, and has no seed and no keys"))
-        return "homogenize", 0
+        return "homogenize", 0, []
     read = [load_scene(scene, tuple(SCENES), [*overrides, *_settings(point)]) for point in points]
-    return COMMANDS[read[0].kind], read[0].seed
+    named = [path.absolute() for model in read for path in files_of(model)[1:]]
+    return COMMANDS[read[0].kind], read[0].seed, named
 
 
 def _settings(point: dict[str, str]) -> list[str]:
@@ -204,17 +212,18 @@ def _at(headline: Any, name: str) -> Any:
     return headline
 
 
-def _names(quantity: str) -> tuple[str, str, str]:
-    """The quantity and the two ends of the interval that some stages give: failure_load_low_pa."""
+def _names(quantity: str) -> tuple[tuple[str, ...], ...]:
+    """Names of the quantity, and of both ends of the interval that some stages give: failure_load_low_pa."""
     stem, _, unit = quantity.rpartition("_")
-    return quantity, f"{stem}_low_{unit}", f"{stem}_high_{unit}"
+    return (quantity,), (f"{stem}_low_{unit}", f"{quantity}_low"), (f"{stem}_high_{unit}", f"{quantity}_high")
 
 
-def _numbers(table: Sequence[Sequence[Run]], name: str) -> np.ndarray:
+def _numbers(table: Sequence[Sequence[Run]], names: Sequence[str]) -> np.ndarray:
     """(points, seeds), nan where a run gave no such number."""
 
     def number(run: Run) -> float:
-        value = _at(run.headline, name) if run.code == 0 and _has(run.headline, name) else None
+        known = [name for name in names if run.code == 0 and _has(run.headline, name)]
+        value = _at(run.headline, known[0]) if known else None
         return float(value) if isinstance(value, int | float) else np.nan
 
     return np.array([[number(run) for run in row] for row in table])
@@ -254,9 +263,9 @@ def _doubts(
         if failed:
             last = (failed[0].said.splitlines() or ["it said nothing"])[-1]
             said.append(f"{_words(point)}: {len(failed)} of {len(row)} runs gave no result: {last}")
-    told = {text for run in table[-1] for text in run.headline.get("warnings", [])}
-    if base.origin != "given":
-        said += [f"the finest run warns: {text}" for text in sorted(told)]
+    for point, row in zip(points, table):
+        told = dict.fromkeys(text for run in row for text in run.headline.get("warnings", []))
+        said += [f"{_words(point)} warns: {text}" for text in told]
     if len(points) > 1 and cpu[-1].mean() < _CHEAPER * cpu[0].mean():
         said.append("the last point costs less than the first: values go from coarse to fine")
     if wanted is not None and best is None:

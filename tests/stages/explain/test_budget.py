@@ -1,7 +1,6 @@
 """--budget: the finest fidelity that fits, with a run at draft first where there is time for it."""
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -10,9 +9,9 @@ from graben.declared.knobs import Promise
 from graben.errors import BadInput
 from graben.stages.explain import budget, size
 from graben.stages.shared.run_apart import Run
-from tests.conftest import command, made
+from tests.conftest import PIPELINES, command, made
 
-WEAR = Path(__file__).parents[3] / "pipelines" / "wear" / "astm-g65-mixtures.toml"
+WEAR = PIPELINES / "wear" / "astm-g65-mixtures.toml"
 BLOCKS = {"kind": "blocks", "loading": {"confining_pressure": "4 MPa"}}
 ZONES = 1675.39
 # 1 s of start; draft 12,500 steps take 2.5 s, standard 10 s, reference 40 s.
@@ -24,7 +23,7 @@ def known(monkeypatch):
     """Costs and promises that are known; returns the factor by which a run at draft is slower than predicted."""
     slower = {"by": 1.0, "code": 0, "made": 0}
 
-    def run(arguments, folder):
+    def run(arguments, folder, limit):
         assert arguments[-2:] == ["--set", "fidelity=draft"]
         slower["made"] += 1
         return Run(slower["code"], {}, "", 1.0 + 2.5 * slower["by"], 3.5, 1000)
@@ -59,9 +58,26 @@ def test_a_run_at_draft_corrects_the_prediction(known):
     assert found.predicted == pytest.approx(31.0, rel=2e-3, abs=1.0)
 
 
-def test_a_run_at_draft_that_fails_corrects_nothing(known):
+def test_a_run_at_draft_that_fails_corrects_nothing_and_is_not_told_of(known):
     known["code"] = 3
-    assert chosen(60.0).fidelity == "reference"
+    assert chosen(60.0).fidelity == "reference" and not chosen(60.0).tried
+
+
+def test_a_run_at_draft_that_takes_the_budget_is_refused(known):
+    known["by"], known["code"] = 40.0, -15
+    with pytest.raises(BadInput, match=r"at least 101 s"):
+        chosen(60.0)
+
+
+def test_what_is_not_known_fits_no_budget():
+    scene = PIPELINES / "upscaling" / "calibrate.toml"
+    with pytest.raises(BadInput, match="not known before"):
+        budget.choose(scene, ["calibrate"], [], [], 60.0)
+
+
+def test_a_restart_keeps_its_fidelity(tmp_path):
+    result = command("dem-run", WEAR, "-o", tmp_path / "r.nc", "--budget", "1 h", "--restart")
+    assert result.exit_code == 2 and "no --budget" in result.output
 
 
 def test_what_fits_nothing_is_refused(known):

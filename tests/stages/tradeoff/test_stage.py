@@ -52,7 +52,7 @@ def test_errors_of_a_sequence_count_from_its_limit(made_up, tmp_path):
     assert all(p["error_low"] < p["error"] < p["error_high"] for p in found["points"])
     assert all(p["on_front"] for p in found["points"])
     assert found["recommended"]["knobs"] == {"mesh.size": "1 m"}
-    assert found["warnings"] == ["the finest run warns: doubtful"]
+    assert found["warnings"] == ["mesh.size 0.5 m warns: doubtful"]
     assert check_artifact(tmp_path / "t.nc") == []
     assert picture.drawn(tmp_path / "t.nc", ".png").startswith(b"\x89PNG")
 
@@ -86,6 +86,36 @@ def test_what_is_done_is_not_done_again(made_up, tmp_path):
     assert len(made_up) == 4
     study(tmp_path, "mesh.size=2 m,1 m", overwrite=True, overrides=["seed=7"])
     assert len(made_up) == 7
+
+
+def test_what_a_scene_names_is_part_of_it(made_up, tmp_path):
+    law = tmp_path / "law.material.toml"
+    law.write_text('law = "elastic"\n[parameters]\nyoung_modulus = "1 GPa"\npoisson_ratio = 0.2\n')
+    settings = {"overrides": [f'material={{file="{law}"}}'], "overwrite": True}
+    study(tmp_path, "mesh.size=2 m,1 m", **settings)
+    study(tmp_path, "mesh.size=2 m,1 m", **settings)
+    assert len(made_up) == 3
+    law.write_text(law.read_text().replace("0.2", "0.3"))
+    study(tmp_path, "mesh.size=2 m,1 m", **settings)
+    assert len(made_up) == 6
+
+
+@pytest.mark.parametrize("code", [-9, -2, 1, 3, 130])
+def test_what_the_machine_ended_is_tried_again(code, monkeypatch, tmp_path):
+    said = "the machine failed: No space left" if code == 3 else ""
+    tries = []
+    monkeypatch.setattr(
+        runs, "measured", lambda arguments, folder: tries.append(1) or Run(code, {}, said, 1.0, 1.0, 1)
+    )
+    task = runs.Task(("fem-run",), tmp_path, "x")
+    assert runs.make(task).code == runs.make(task).code == code and len(tries) == 2
+
+
+def test_an_interval_is_found_behind_the_unit_too(monkeypatch, tmp_path):
+    headline = {"n_per_m2": 4.0, "n_per_m2_low": 3.8, "n_per_m2_high": 4.4}
+    monkeypatch.setattr(runs, "measured", lambda arguments, folder: Run(0, headline, "", 1.0, 1.0, 1))
+    found = study(tmp_path, "mesh.size=2 m,1 m", quantity="n_per_m2", reference=4.0)["points"][0]
+    assert (found["error_low"], found["error_high"]) == (pytest.approx(-0.05), pytest.approx(0.1))
 
 
 def test_a_point_that_fails_is_told(made_up, tmp_path):
