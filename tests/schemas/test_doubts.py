@@ -7,6 +7,7 @@ from graben.schemas.provenance import Record
 from graben.schemas.scenes.material import read_material, write_material
 from graben.stages.tools import picture
 from tests.conftest import command, made
+from tests.stages.shared.test_measures import COLUMN
 from tests.stages.wear_estimate.test_stage import TABLE
 
 VALUES = {"young_modulus": 1e9, "poisson_ratio": 0.2}
@@ -39,11 +40,14 @@ def test_strict_ends_with_3_and_the_result_is_written(tmp_path):
     assert command("wear-estimate", TABLE, "-o", tmp_path / "w.nc", "-q").exit_code == 0
     result = command("wear-estimate", TABLE, "-o", tmp_path / "s.nc", "-q", "--strict")
     assert result.exit_code == 3 and "it has warnings" in result.output and (tmp_path / "s.nc").exists()
-    calm = command(
+    (tmp_path / "column.toml").write_text(COLUMN.replace("RATE", "10 MPa/s"))
+    calm = command("fem-run", tmp_path / "column.toml", "-o", tmp_path / "c.nc", "-q", "--strict")
+    assert calm.exit_code == 0, calm.output
+    studied = command(
         "tradeoff", TABLE, "--quantity", "mixtures.0.wear_rate_m3_per_s", "--knob", "machine.rotation=1 rpm,2 rpm",
         "--reference", "1e-9", "-o", tmp_path / "t.nc", "-q", "--strict",
     )  # fmt: skip
-    assert calm.exit_code == 0, calm.output
+    assert studied.exit_code == 3, "what a point warns of is repeated"
 
 
 def test_a_picture_bears_them(tmp_path, monkeypatch):
